@@ -1,0 +1,38 @@
+# Each target sets up what it needs in .venv; nothing else on the machine is touched.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO_OUT ?= runs/demo
+INSTALLED := $(VENV)/.installed
+
+.PHONY: demo test check format bench quality clean
+
+demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
+	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
+	$(BIN)/jmorl show $(DEMO_OUT)
+
+test: $(INSTALLED)  ## the test suite (a few minutes)
+	$(BIN)/python -m pytest
+
+check: $(INSTALLED)  ## lint, format and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(INSTALLED)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(INSTALLED)  ## speed and memory, beside morl-baselines; the first time it installs that (gigabytes) in .venv-peer
+	$(BIN)/python -m benchmarks.speed
+
+quality: $(INSTALLED)  ## how good the found policies are against the exact front: 5 seeds, 3 users, 2 methods
+	$(BIN)/python -m benchmarks.quality
+
+$(INSTALLED): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) .venv-peer build *.egg-info .mypy_cache .ruff_cache .pytest_cache

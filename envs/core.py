@@ -1,0 +1,114 @@
+"""The contract of a multi-objective environment in pure JAX.
+
+A new environment subclasses `Environment` and writes three pure functions of *one* state:
+`initial_state`, `observe` and `transition`. This module adds what every environment shares:
+the time limit, the reset within the same step, and the separation of `terminated`,
+`truncated` and the final observation. Callers batch with `jax.vmap`.
+
+Shape letters: O observation size, A action size, M objectives.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+
+PhysicsState = TypeVar("PhysicsState")
+
+
+@dataclass(frozen=True)
+class Objective:
+    """One component of the vector reward. Always maximised.
+
+    `label` is the quantity and `unit` what an undiscounted return is measured in, as shown on
+    axes and in tables.
+    """
+
+    name: str
+    label: str
+    unit: str
+
+
+class Transition(NamedTuple):
+    """What one application of the dynamics produced, before any time limit or reset."""
+
+    state: Any  # the successor state
+    reward: jax.Array  # [M] float32, the environment's own units
+    terminated: jax.Array  # [] bool, the task itself ended
+
+
+@struct.dataclass
+class EpisodeState(Generic[PhysicsState]):
+    """A physics state and how many steps of the current episode lie behind it."""
+
+    physics: PhysicsState
+    elapsed_steps: jax.Array  # [] int32
+
+
+class Step(NamedTuple):
+    """One environment step, the reset after an ending included.
+
+    `observation` is where the next action is chosen: the successor, or the first observation of
+    the next episode if this one ended. `final_observation` is always the true successor, so a
+    truncated step can bootstrap from its value.
+    """
+
+    observation: jax.Array  # [O]
+    reward: jax.Array  # [M]
+    terminated: jax.Array  # [] bool: bootstrap from zero
+    truncated: jax.Array  # [] bool: the time limit, and not terminated: bootstrap from final_observation
+    final_observation: jax.Array  # [O]
+
+
+class Environment(ABC, Generic[PhysicsState]):
+    """A multi-objective Markov decision process with continuous actions and a time limit.
+
+    Actions are boxes: every component in [`action_low`, `action_high`]; `transition` clips.
+    An instance holds no state and is hashable by identity, so it can be closed over by `jit`.
+    """
+
+    id: ClassVar[str]
+    objectives: ClassVar[tuple[Objective, ...]]
+    observation_size: ClassVar[int]
+    action_size: ClassVar[int]
+    action_low: ClassVar[float] = -1.0
+    action_high: ClassVar[float] = 1.0
+    time_limit: ClassVar[int]
+
+    @abstractmethod
+    def initial_state(self, key: jax.Array) -> PhysicsState:
+        """A state drawn from the start distribution."""
+
+    @abstractmethod
+    def observe(self, state: PhysicsState) -> jax.Array:  # [O]
+        """What the agent sees of a state."""
+
+    @abstractmethod
+    def transition(self, state: PhysicsState, action: jax.Array) -> Transition:
+        """The dynamics: state and action [A] to successor, vector reward and termination."""
+
+    def reset(self, key: jax.Array) -> tuple[EpisodeState[PhysicsState], jax.Array]:
+        """Start an episode. Returns its state and first observation [O]."""
+        physics = self.initial_state(key)
+        return EpisodeState(physics, jnp.zeros((), jnp.int32)), self.observe(physics)
+
+    def advance(self, state: EpisodeState[PhysicsState], action: jax.Array) -> tuple[EpisodeState[PhysicsState], Step]:
+        """One step without reset: an ended episode stays at its final state. For evaluation and playback."""
+        physics, reward, terminated = self.transition(state.physics, action)
+        elapsed_steps = state.elapsed_steps + 1
+        truncated = (elapsed_steps >= self.time_limit) & ~terminated
+        observation = self.observe(physics)
+        return EpisodeState(physics, elapsed_steps), Step(observation, reward, terminated, truncated, observation)
+
+    def step(
+        self, key: jax.Array, state: EpisodeState[PhysicsState], action: jax.Array
+    ) -> tuple[EpisodeState[PhysicsState], Step]:
+        """One step; if it ends the episode, the next one starts within the same step, from `key`."""
+        continued, step = self.advance(state, action)
+        fresh, first_observation = self.reset(key)
+        ended = step.terminated | step.truncated
+        next_state = jax.tree.map(lambda new, old: jnp.where(ended, new, old), fresh, continued)
+        return next_state, step._replace(observation=jnp.where(ended, first_observation, step.final_observation))

@@ -1,0 +1,109 @@
+"""What every registered environment promises."""
+
+import envs
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+STEPS = 60
+
+
+@pytest.fixture(params=envs.ids())
+def environment(request):
+    return envs.make(request.param)
+
+
+def random_actions(environment, key, count):
+    return 1.5 * jax.random.uniform(key, (count, environment.action_size), minval=-1.0)  # beyond the limits, too
+
+
+def random_episode(environment, key, steps=STEPS):
+    reset_key, action_key, step_key = jax.random.split(key, 3)
+    start = environment.reset(reset_key)
+    inputs = random_actions(environment, action_key, steps), jax.random.split(step_key, steps)
+
+    def act(state, inputs):
+        action, key = inputs
+        state, step = environment.step(key, state, action)
+        return state, (state, step)
+
+    return start, jax.lax.scan(act, start[0], inputs)[1]
+
+
+def test_shapes_and_types(environment):
+    (state, observation), (_, step) = random_episode(environment, jax.random.key(0))
+    objectives = len(environment.objectives)
+    assert objectives >= 2
+    assert observation.shape == (environment.observation_size,)
+    assert state.elapsed_steps.dtype == jnp.int32
+    assert step.observation.shape == step.final_observation.shape == (STEPS, environment.observation_size)
+    assert step.reward.shape == (STEPS, objectives)
+    assert step.reward.dtype == observation.dtype == jnp.float32
+    assert step.terminated.dtype == step.truncated.dtype == jnp.bool_
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(step))
+
+
+def test_objectives_are_described(environment):
+    assert len({objective.name for objective in environment.objectives}) == len(environment.objectives)
+    assert all(objective.label and objective.unit for objective in environment.objectives)
+
+
+def test_same_key_same_episode_other_key_another(environment):
+    first, again, other = (random_episode(environment, jax.random.key(seed)) for seed in (1, 1, 2))
+    for left, right in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
+        np.testing.assert_array_equal(left, right)
+    assert not np.array_equal(first[0][1], other[0][1])
+
+
+def test_vmap_equals_a_loop(environment):
+    keys = jax.random.split(jax.random.key(3), 5)
+    batched = jax.jit(jax.vmap(lambda key: random_episode(environment, key)))(keys)
+    single = jax.jit(lambda key: random_episode(environment, key))
+    for index, key in enumerate(keys):
+        for together, alone in zip(jax.tree.leaves(batched), jax.tree.leaves(single(key)), strict=True):
+            np.testing.assert_allclose(together[index], alone, rtol=1e-4, atol=1e-5)
+
+
+def test_truncates_exactly_at_the_time_limit(environment):
+    state, _ = environment.reset(jax.random.key(4))
+    action = jnp.zeros(environment.action_size)
+    step = jax.jit(environment.step)
+    for elapsed, expected in ((environment.time_limit - 2, False), (environment.time_limit - 1, True)):
+        almost = state.replace(elapsed_steps=jnp.array(elapsed, jnp.int32))
+        after, result = step(jax.random.key(5), almost, action)
+        assert not result.terminated
+        assert result.truncated == expected
+        assert after.elapsed_steps == (0 if expected else elapsed + 1)
+
+
+def test_an_ending_resets_in_the_same_step_and_keeps_the_final_observation(environment):
+    state, first = environment.reset(jax.random.key(6))
+    ending = state.replace(elapsed_steps=jnp.array(environment.time_limit - 1, jnp.int32))
+    action = jnp.full(environment.action_size, 0.5)
+    _, continued = environment.advance(state, action)
+    fresh, fresh_observation = environment.reset(jax.random.key(7))
+    after, step = environment.step(jax.random.key(7), ending, action)
+    np.testing.assert_array_equal(step.observation, fresh_observation)
+    np.testing.assert_array_equal(step.final_observation, continued.final_observation)
+    assert not np.array_equal(step.final_observation, step.observation)
+    for left, right in zip(jax.tree.leaves(after), jax.tree.leaves(fresh), strict=True):
+        np.testing.assert_array_equal(left, right)
+
+
+def test_no_step_crosses_an_episode(environment):
+    """Following elapsed steps: each is one more than the last, or zero exactly after an ending."""
+    _, (states, steps) = random_episode(environment, jax.random.key(8), environment.time_limit + 50)
+    ended = np.asarray(steps.terminated | steps.truncated)
+    assert ended.any()
+    before = np.concatenate([[0], states.elapsed_steps[:-1]])
+    np.testing.assert_array_equal(states.elapsed_steps, np.where(ended, 0, before + 1))
+
+
+def test_actions_are_clipped(environment):
+    state, _ = environment.reset(jax.random.key(9))
+    limit = jnp.full(environment.action_size, environment.action_high)
+    _, at_limit = environment.advance(state, limit)
+    _, beyond = environment.advance(state, 3 * limit)
+    for left, right in zip(at_limit, beyond, strict=True):
+        np.testing.assert_array_equal(left, right)
