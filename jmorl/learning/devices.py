@@ -1,0 +1,21 @@
+"""Setting JAX up before its first use: CPU cores as devices, and a compilation cache on disk."""
+
+import os
+from pathlib import Path
+
+import jax
+
+
+def use_all_cpu_cores() -> None:
+    """Make every CPU core this process may use a JAX device, and keep compiled programs on disk.
+
+    Call it before JAX is first used; a program that has already used JAX keeps the devices it has. Settings
+    made through JAX's own environment variables are left alone.
+    """
+    if "JAX_NUM_CPU_DEVICES" not in os.environ:
+        jax.config.update("jax_num_cpu_devices", len(os.sched_getaffinity(0)))
+    if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
+        cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "jmorl" / "jax"
+        jax.config.update("jax_compilation_cache_dir", str(cache))
+    if "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS" not in os.environ:
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)

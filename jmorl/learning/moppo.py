@@ -1,0 +1,290 @@
+"""Multi-objective PPO for one agent: collect, estimate advantages per objective, update.
+
+No population axis here; `jmorl.learning.population` vmaps. PPO after Schulman et al. 2017, its multi-objective
+form after Xu et al. 2020 (PGMORL).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import chex
+import jax
+import jax.numpy as jnp
+import optax
+from flax import struct
+
+from envs.core import Environment, EpisodeState
+from jmorl.config import PPOConfig
+from jmorl.learning.losses import clipped_surrogate_loss, clipped_value_loss, normalize_advantages
+from jmorl.learning.networks import Actor, critic_network, gaussian_entropy, gaussian_log_probability
+from jmorl.learning.returns import discounted_sums, generalized_advantages
+from jmorl.learning.rollout import EpisodeReturns, Trajectory, episode_returns, rollout
+from jmorl.learning.statistics import (
+    RunningStatistics,
+    initial_statistics,
+    normalize,
+    return_scale,
+    update_statistics,
+)
+
+Parameters = Any  # {"actor": ..., "critic": ...}, pytrees of flax.linen
+
+
+@struct.dataclass
+class Learner:
+    """All that an offspring inherits and that is stored with a policy."""
+
+    parameters: Parameters
+    optimizer_state: optax.OptState
+    observation_statistics: RunningStatistics  # [O]
+    return_statistics: RunningStatistics  # [M] of the discounted reward sums; their deviation scales rewards
+
+
+@struct.dataclass
+class Workers:
+    """The environments of one agent, between two rollouts."""
+
+    states: EpisodeState[Any]  # [E]
+    observations: jax.Array  # [E, O]
+    discounted_sums: jax.Array  # [E, M]
+
+
+class Batch(NamedTuple):
+    """What one update learns from; minibatches are slices of its leading axis."""
+
+    observation: jax.Array  # [B, O] normalised
+    action: jax.Array  # [B, A]
+    log_probability: jax.Array  # [B]
+    value: jax.Array  # [B, M] in reward-scaled units
+    advantage: jax.Array  # [B] scalarised
+    returns: jax.Array  # [B, M] in reward-scaled units
+
+
+class Diagnostics(NamedTuple):
+    """Of one iteration: means over the last epoch's minibatches, and where numbers stopped being finite."""
+
+    policy_loss: jax.Array  # []
+    value_loss: jax.Array  # []
+    entropy: jax.Array  # []
+    approximate_kl: jax.Array  # [] between the policy that acted and the updated one
+    fault: jax.Array  # [] int32 index into FAULTS
+    fault_iteration: jax.Array  # [] int32, from 1; meaningless without a fault
+
+
+FAULTS = ("none", "observation", "reward", "loss")
+
+
+@dataclass(frozen=True, eq=False)
+class MOPPO:
+    """The algorithm for one environment and one setting; its methods are pure functions."""
+
+    environment: Environment[Any]
+    config: PPOConfig
+
+    @cached_property
+    def actor(self) -> Any:  # Actor; flax types what `apply` returns too widely
+        return Actor(self.config.hidden_sizes, self.environment.action_size, self.config.initial_log_std)
+
+    @cached_property
+    def critic(self) -> Any:
+        return critic_network(self.config.hidden_sizes, len(self.environment.objectives))
+
+    @cached_property
+    def optimizer(self) -> optax.GradientTransformation:
+        # Flattened: one vector operation instead of one for each of a dozen small arrays.
+        adam = optax.adam(self.config.learning_rate, eps=self.config.adam_epsilon)
+        return optax.flatten(optax.chain(optax.clip_by_global_norm(self.config.max_gradient_norm), adam))
+
+    def initial_learner(self, key: jax.Array) -> Learner:
+        """A new agent's networks, optimiser and statistics."""
+        actor_key, critic_key = jax.random.split(key)
+        observation = jnp.zeros(self.environment.observation_size)
+        parameters = {
+            "actor": self.actor.init(actor_key, observation),
+            "critic": self.critic.init(critic_key, observation),
+        }
+        return Learner(
+            parameters,
+            self.optimizer.init(parameters),
+            initial_statistics((self.environment.observation_size,)),
+            initial_statistics((len(self.environment.objectives),)),
+        )
+
+    def train(
+        self, learner: Learner, weights: jax.Array, key: jax.Array, iterations: jax.Array
+    ) -> tuple[Learner, Diagnostics]:
+        """`iterations` [] PPO iterations with `weights` [M], from freshly reset environments.
+
+        Rollouts continue from one iteration to the next. The number of iterations is data, so a warm-up and
+        a generation of different lengths share one compilation.
+        """
+        workers_key, iterations_key = jax.random.split(key)
+        zero = jnp.zeros(())
+        start = Diagnostics(zero, zero, zero, zero, jnp.array(0), jnp.array(0))
+
+        def body(index: jax.Array, carry: Any) -> Any:
+            learner, workers, previous = carry
+            iteration_key = jax.random.fold_in(iterations_key, index)
+            learner, workers, diagnostics = self.iteration(learner, workers, weights, iteration_key)
+            return learner, workers, _keep_first_fault(previous, diagnostics, index + 1)
+
+        learner, _, diagnostics = jax.lax.fori_loop(
+            0, iterations, body, (learner, self.start_workers(workers_key), start)
+        )
+        return learner, diagnostics
+
+    def start_workers(self, key: jax.Array) -> Workers:
+        """E environments at the start of an episode."""
+        states, observations = jax.vmap(self.environment.reset)(jax.random.split(key, self.config.environments))
+        sums = jnp.zeros((self.config.environments, len(self.environment.objectives)))
+        return Workers(states, observations, sums)
+
+    def iteration(
+        self, learner: Learner, workers: Workers, weights: jax.Array, key: jax.Array
+    ) -> tuple[Learner, Workers, Diagnostics]:
+        """Collect E*T steps, then update on them."""
+        rollout_key, update_key = jax.random.split(key)
+        workers, trajectory, return_statistics = self.collect(learner, workers, rollout_key)
+        batch = self.batch(learner, trajectory, return_scale(return_statistics), weights)
+        parameters, optimizer_state, diagnostics = self.update(learner, batch, update_key)
+        updated = Learner(
+            parameters,
+            optimizer_state,
+            update_statistics(learner.observation_statistics, trajectory.observation),
+            return_statistics,
+        )
+        return updated, workers, diagnostics._replace(fault=_fault(trajectory, parameters, diagnostics))
+
+    def collect(
+        self, learner: Learner, workers: Workers, key: jax.Array
+    ) -> tuple[Workers, Trajectory, RunningStatistics]:
+        """T steps in every environment: where to continue, the trajectories [E, T, ...], the updated reward scale."""
+        policy = self.policy(learner)
+        keys = jax.random.split(key, self.config.environments)
+        (states, observations), trajectory = jax.vmap(
+            lambda key, state, observation: rollout(
+                self.environment, policy, key, (state, observation), self.config.rollout_steps
+            )
+        )(keys, workers.states, workers.observations)
+        ended = trajectory.terminated | trajectory.truncated
+        sums, carried = jax.vmap(discounted_sums, in_axes=(0, 0, 0, None))(
+            trajectory.reward, ended, workers.discounted_sums, self.config.discount
+        )
+        statistics = update_statistics(learner.return_statistics, sums)
+        return Workers(states, observations, carried), trajectory, statistics
+
+    def batch(self, learner: Learner, trajectory: Trajectory, reward_scale: jax.Array, weights: jax.Array) -> Batch:
+        """Trajectories [E, T, ...] to what PPO learns from [E*T, ...], with advantages scalarised by `weights`.
+
+        Values are learned in reward-scaled units whatever the weights act on: only then does one learning rate
+        suit every objective. The statistics are those the policy acted with.
+        """
+        observation = normalize(learner.observation_statistics, trajectory.observation)
+        mean, log_std = self.actor.apply(learner.parameters["actor"], observation)
+        value = self.critic.apply(learner.parameters["critic"], observation)
+        final_observation = normalize(learner.observation_statistics, trajectory.final_observation)
+        final_value = self.critic.apply(learner.parameters["critic"], final_observation)
+        advantage = jax.vmap(generalized_advantages, in_axes=(0, 0, 0, 0, 0, None, None))(
+            trajectory.reward / reward_scale,
+            value,
+            final_value,
+            trajectory.terminated,
+            trajectory.truncated,
+            self.config.discount,
+            self.config.gae_lambda,
+        )
+        chex.assert_equal_shape([value, final_value, advantage, trajectory.reward])
+        objective_weights = weights * reward_scale if self.config.weights_on == "raw" else weights
+        batch = Batch(
+            observation,
+            trajectory.action,
+            gaussian_log_probability(mean, log_std, trajectory.action),
+            value,
+            advantage @ objective_weights,
+            advantage + value,
+        )
+        return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), batch)
+
+    def update(self, learner: Learner, batch: Batch, key: jax.Array) -> tuple[Parameters, optax.OptState, Diagnostics]:
+        """`epochs` passes over the batch, each in a new order and `minibatches` steps of the optimiser."""
+        size = batch.advantage.shape[0]
+
+        def epoch(carry: Any, epoch_key: jax.Array) -> Any:
+            order = _random_order(epoch_key, size).reshape(self.config.minibatches, -1)
+            return jax.lax.scan(minibatch, carry, order)
+
+        def minibatch(carry: Any, indices: jax.Array) -> Any:
+            return self.gradient_step(carry, jax.tree.map(lambda x: x[indices], batch))
+
+        epoch_keys = jax.random.split(key, self.config.epochs)
+        carry, diagnostics = jax.lax.scan(epoch, (learner.parameters, learner.optimizer_state), epoch_keys)
+        return *carry, jax.tree.map(lambda x: x[-1].mean(0), diagnostics)
+
+    def gradient_step(
+        self, carry: tuple[Parameters, optax.OptState], minibatch: Batch
+    ) -> tuple[tuple[Parameters, optax.OptState], Diagnostics]:
+        """One step of the optimiser down the loss of a minibatch."""
+        parameters, optimizer_state = carry
+        gradients, diagnostics = jax.grad(self.loss, has_aux=True)(parameters, minibatch)
+        updates, optimizer_state = self.optimizer.update(gradients, optimizer_state, parameters)
+        return (optax.apply_updates(parameters, updates), optimizer_state), diagnostics
+
+    def loss(self, parameters: Parameters, batch: Batch) -> tuple[jax.Array, Diagnostics]:
+        """The PPO loss of one minibatch, and its parts."""
+        mean, log_std = self.actor.apply(parameters["actor"], batch.observation)
+        values = self.critic.apply(parameters["critic"], batch.observation)
+        log_probability = gaussian_log_probability(mean, log_std, batch.action)
+        policy_loss = clipped_surrogate_loss(
+            log_probability, batch.log_probability, normalize_advantages(batch.advantage), self.config.clip
+        )
+        value_loss = clipped_value_loss(values, batch.value, batch.returns, self.config.clip)
+        entropy = gaussian_entropy(log_std)
+        loss = policy_loss + self.config.value_coefficient * value_loss - self.config.entropy_coefficient * entropy
+        kl = (batch.log_probability - log_probability).mean()
+        return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0))
+
+    def policy(self, learner: Learner) -> Any:
+        """The learner as a function of one raw observation [O]: (mean action [A], log-std [A])."""
+        return lambda observation: self.actor.apply(
+            learner.parameters["actor"], normalize(learner.observation_statistics, observation)
+        )
+
+    def evaluate(self, learner: Learner, keys: jax.Array) -> EpisodeReturns:
+        """One deterministic episode for each start key [episodes], with the learner's frozen statistics."""
+        policy = self.policy(learner)
+        return jax.vmap(lambda key: episode_returns(self.environment, policy, key, self.config.discount))(keys)
+
+
+def _random_order(key: jax.Array, size: int) -> jax.Array:
+    """The indices below `size` in random order [size].
+
+    Sorts words whose high bits are random and whose low bits are the index: nearly ten times as fast on a CPU as
+    `jax.random.permutation`, which takes a fifth of a training iteration. Indices that draw equal high bits stay
+    neighbours in order, which does not matter to minibatches.
+    """
+    index_bits = max(size - 1, 1).bit_length()
+    random_bits = jax.random.bits(key, (size,)) >> index_bits << index_bits
+    words = jnp.sort(random_bits | jnp.arange(size, dtype=jnp.uint32))
+    return (words & ((1 << index_bits) - 1)).astype(jnp.int32)
+
+
+def _fault(trajectory: Trajectory, parameters: Parameters, diagnostics: Diagnostics) -> jax.Array:
+    """The first cause, in the order in which one would bring about the next, of numbers that are not finite."""
+
+    def broken(tree: Any) -> jax.Array:
+        return jnp.stack([~jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(tree)]).any()
+
+    observations = (trajectory.observation, trajectory.final_observation)
+    losses = (parameters, diagnostics.policy_loss, diagnostics.value_loss)
+    faults = jnp.stack([broken(observations), broken(trajectory.reward), broken(losses)])
+    return jnp.where(faults.any(), 1 + faults.argmax(), 0)
+
+
+def _keep_first_fault(previous: Diagnostics, current: Diagnostics, iteration: jax.Array) -> Diagnostics:
+    """Once a fault is recorded it stays: later iterations only compute with its consequences."""
+    faulty = previous.fault > 0
+    return current._replace(
+        fault=jnp.where(faulty, previous.fault, current.fault),
+        fault_iteration=jnp.where(faulty, previous.fault_iteration, iteration),
+    )

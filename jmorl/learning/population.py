@@ -1,0 +1,101 @@
+"""The population: agents vmapped, and their axis sharded over all devices. The only `jit` of the project."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+from jax.sharding import Mesh, PartitionSpec
+
+from envs.core import Environment
+from jmorl.config import Config
+from jmorl.learning.moppo import FAULTS, MOPPO, Diagnostics, Learner
+from jmorl.learning.rollout import EpisodeReturns
+
+AGENTS = "agents"  # the mesh axis
+
+
+class TrainingFault(RuntimeError):
+    """Numbers stopped being finite in training. The message names agents and causes."""
+
+
+class Population:
+    """P agents trained and evaluated side by side, each call one compiled program.
+
+    Learners cross this boundary as host arrays with a leading P axis, so that the search can store, mix and
+    inherit them without touching a device.
+    """
+
+    def __init__(self, environment: Environment[Any], config: Config):
+        self.size = config.population.agents
+        self.moppo = MOPPO(environment, config.ppo)
+        self.devices = jax.devices()[: device_count(self.size, jax.device_count())]
+        mesh = Mesh(np.array(self.devices), (AGENTS,))
+        self._initialize = jax.jit(jax.vmap(self.moppo.initial_learner))
+        self._train = _sharded(self.moppo.train, mesh)
+        self._evaluate = _sharded(self.moppo.evaluate, mesh)
+
+    def compile(self, start_keys: jax.Array) -> float:
+        """Compile both calls, for evaluation from as many start keys [episodes]. Returns the seconds it took.
+
+        What is called afterwards are these programs: nothing is traced or compiled again.
+        """
+        started = time.perf_counter()
+        keys = jax.random.split(start_keys[0], self.size)
+        learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys)
+        weights = np.zeros((self.size, len(self.moppo.environment.objectives)), np.float32)
+        self._train = self._train.lower(learners, weights, keys, np.int32(0)).compile()
+        self._evaluate = self._evaluate.lower(learners, start_keys).compile()
+        return time.perf_counter() - started
+
+    def initialize(self, key: jax.Array) -> Learner:
+        """P new learners [P, ...]."""
+        return jax.device_get(self._initialize(jax.random.split(key, self.size)))
+
+    def train(
+        self, learners: Learner, weights: np.ndarray, key: jax.Array, iterations: int
+    ) -> tuple[Learner, Diagnostics]:
+        """Train every learner [P, ...] with its weights [P, M] for `iterations` PPO iterations.
+
+        Raises TrainingFault, naming agents, causes and iterations, if any number stopped being finite.
+        """
+        keys = jax.random.split(key, self.size)
+        weights = np.asarray(weights, np.float32)
+        learners, diagnostics = jax.device_get(self._train(learners, weights, keys, np.int32(iterations)))
+        _raise_faults(diagnostics)
+        return learners, diagnostics
+
+    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
+        """Returns [P, episodes, M] of every learner from the same start keys [episodes]."""
+        return jax.device_get(self._evaluate(learners, keys))
+
+
+def device_count(agents: int, available: int) -> int:
+    """How many devices a population uses: the largest divisor of its size that the machine has."""
+    return max(count for count in range(1, min(agents, available) + 1) if agents % count == 0)
+
+
+def _sharded(function: Callable[..., Any], mesh: Mesh) -> Any:
+    """`function` of one agent as one compiled call for all: every argument has a P axis but the last, shared one."""
+
+    def population(*arguments: Any) -> Any:
+        axes = (*[0] * (len(arguments) - 1), None)
+        specs = (*[PartitionSpec(AGENTS)] * (len(arguments) - 1), PartitionSpec())
+        batched = jax.vmap(function, in_axes=axes)
+        return jax.shard_map(batched, mesh=mesh, in_specs=specs, out_specs=PartitionSpec(AGENTS), check_vma=False)(
+            *arguments
+        )
+
+    return jax.jit(population)
+
+
+def _raise_faults(diagnostics: Diagnostics) -> None:
+    faulty = np.flatnonzero(diagnostics.fault)
+    if len(faulty):
+        lines = [
+            f"agent {agent}: {FAULTS[diagnostics.fault[agent]]} is not finite in iteration "
+            f"{diagnostics.fault_iteration[agent]}"
+            for agent in faulty
+        ]
+        raise TrainingFault("; ".join(lines))

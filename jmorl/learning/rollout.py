@@ -1,0 +1,93 @@
+"""Acting in the environment: trajectories to learn from, and episodes to be scored by."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from envs.core import Environment, EpisodeState
+
+PolicyFunction = Callable[[jax.Array], tuple[jax.Array, jax.Array]]  # observation [O] -> mean [A], log_std [A]
+
+
+class Trajectory(NamedTuple):
+    """Steps of one environment. After `lax.scan` every field has a leading T axis."""
+
+    observation: jax.Array  # [O] acted on
+    action: jax.Array  # [A] as sampled; the environment clips
+    reward: jax.Array  # [M] raw
+    terminated: jax.Array  # [] bool
+    truncated: jax.Array  # [] bool
+    final_observation: jax.Array  # [O] the true successor
+
+
+def rollout(
+    environment: Environment[Any],
+    policy: PolicyFunction,
+    key: jax.Array,
+    start: tuple[EpisodeState[Any], jax.Array],  # state and observation [O]
+    steps: int,
+) -> tuple[tuple[EpisodeState[Any], jax.Array], Trajectory]:
+    """Act for `steps` steps with sampled actions, across episode ends.
+
+    Returns where to continue, and the trajectory [T, ...].
+    """
+    noise_key, reset_key = jax.random.split(key)
+    # Drawn outside the scan: one large draw is much cheaper than T small ones.
+    noise = jax.random.normal(noise_key, (steps, environment.action_size))
+    reset_keys = jax.random.split(reset_key, steps)
+
+    def act(
+        carry: tuple[EpisodeState[Any], jax.Array], randomness: tuple[jax.Array, jax.Array]
+    ) -> tuple[tuple[EpisodeState[Any], jax.Array], Trajectory]:
+        state, observation = carry
+        noise_t, key_t = randomness
+        mean, log_std = policy(observation)
+        action = mean + jnp.exp(log_std) * noise_t
+        state, step = environment.step(key_t, state, action)
+        transition = Trajectory(
+            observation, action, step.reward, step.terminated, step.truncated, step.final_observation
+        )
+        return (state, step.observation), transition
+
+    return jax.lax.scan(act, start, (noise, reset_keys))
+
+
+class EpisodeReturns(NamedTuple):
+    """The vector returns of one episode."""
+
+    undiscounted: jax.Array  # [M]
+    discounted: jax.Array  # [M]
+    length: jax.Array  # [] int32 steps
+
+
+def episode_returns(
+    environment: Environment[Any], policy: PolicyFunction, key: jax.Array, discount: float
+) -> EpisodeReturns:
+    """One episode from `key`'s start, with deterministic actions (the mean), to its end or the time limit.
+
+    The scan always runs to the time limit; what comes after the end is masked.
+    """
+
+    def act(
+        carry: tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], _: None
+    ) -> tuple[tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], None]:
+        state, observation, running, returns = carry
+        mean, _log_std = policy(observation)
+        state, step = environment.advance(state, mean)
+        # A weight of zero would let a NaN from beyond the end through; a where does not.
+        reward = jnp.where(running, step.reward, 0.0)
+        returns = EpisodeReturns(
+            returns.undiscounted + reward,
+            returns.discounted + discount**returns.length * reward,
+            returns.length + running,
+        )
+        running = running & ~(step.terminated | step.truncated)
+        return (state, step.observation, running, returns), None
+
+    state, observation = environment.reset(key)
+    zeros = jnp.zeros(len(environment.objectives))
+    start = (state, observation, jnp.array(True), EpisodeReturns(zeros, zeros, jnp.array(0)))
+    (_, _, _, returns), _ = jax.lax.scan(act, start, None, length=environment.time_limit)
+    return returns

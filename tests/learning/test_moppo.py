@@ -1,0 +1,142 @@
+"""MOPPO's own steps, and what it learns on probe environments."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jmorl.config import PPOConfig
+from jmorl.learning.losses import normalize_advantages
+from jmorl.learning.moppo import MOPPO, _random_order
+from jmorl.learning.returns import discounted_sums
+from jmorl.learning.statistics import normalize, return_scale
+
+from tests.probes import Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
+
+QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rate": 3e-3, "discount": 0.9}
+
+
+def learned(environment, weights=(0.5, 0.5), iterations=40, **settings):
+    moppo = MOPPO(environment, PPOConfig(**{**QUICK, **settings}))
+    start = moppo.initial_learner(jax.random.key(0))
+    learner, _ = jax.jit(moppo.train)(start, jnp.array(weights), jax.random.key(1), iterations)
+    return moppo, learner
+
+
+def values(moppo, learner, observations):
+    """The critic's values in raw units."""
+    x = normalize(learner.observation_statistics, jnp.asarray(observations)[:, None])
+    scaled = moppo.critic.apply(learner.parameters["critic"], x)
+    return scaled * return_scale(learner.return_statistics)
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, 4000])
+def test_random_order_is_a_permutation_and_depends_on_the_key(size):
+    orders = [np.asarray(_random_order(jax.random.key(seed), size)) for seed in range(3)]
+    for order in orders:
+        np.testing.assert_array_equal(np.sort(order), np.arange(size))
+    if size > 100:
+        assert not np.array_equal(orders[0], orders[1])
+        assert abs(np.corrcoef(orders[0], np.arange(size))[0, 1]) < 0.1
+
+
+def test_every_index_is_equally_likely_in_every_place():
+    orders = jax.vmap(lambda key: _random_order(key, 4))(jax.random.split(jax.random.key(0), 4000))
+    counts = np.array([[(np.asarray(orders)[:, place] == index).sum() for index in range(4)] for place in range(4)])
+    assert np.abs(counts - 1000).max() < 150  # more than five standard deviations
+
+
+def test_advantages_of_one_sample_or_all_equal_are_zero_not_nan():
+    for advantages in (jnp.array([3.0]), jnp.full(8, -2.0)):
+        np.testing.assert_array_equal(normalize_advantages(advantages), jnp.zeros_like(advantages))
+
+
+def test_discounted_sums_equal_a_loop():
+    generator = np.random.default_rng(0)
+    rewards, ended = generator.normal(size=(40, 2)).astype(np.float32), generator.random(40) < 0.2
+    start = np.array([0.5, -1.0], np.float32)
+    expected, carried = [], start
+    for reward, end in zip(rewards, ended, strict=True):
+        total = 0.9 * carried + reward
+        expected.append(total)
+        carried = np.zeros(2) if end else total
+    sums, last = discounted_sums(rewards, ended, start, 0.9)
+    np.testing.assert_allclose(sums, expected, rtol=1e-5)
+    np.testing.assert_allclose(last, carried, rtol=1e-5)
+
+
+def test_rollouts_continue_across_iterations():
+    """Endless episodes of ten steps, seven in a rollout: the second one starts where the first one stopped."""
+    moppo = MOPPO(Follow(), PPOConfig(environments=2, rollout_steps=7, minibatches=1))
+    learner = moppo.initial_learner(jax.random.key(0))
+    workers = moppo.start_workers(jax.random.key(1))
+    after, trajectory, _ = moppo.collect(learner, workers, jax.random.key(2))
+    np.testing.assert_array_equal(trajectory.observation[:, 0], workers.observations)
+    _, following, _ = moppo.collect(learner, after, jax.random.key(3))
+    np.testing.assert_array_equal(following.observation[:, 0], after.observations)
+
+
+def test_log_probability_is_of_the_unclipped_action_under_the_policy_that_acted():
+    moppo = MOPPO(ThreeWays(), PPOConfig(environments=2, rollout_steps=50, minibatches=1))
+    learner = moppo.initial_learner(jax.random.key(0))
+    _, trajectory, statistics = moppo.collect(learner, moppo.start_workers(jax.random.key(1)), jax.random.key(2))
+    batch = moppo.batch(learner, trajectory, jnp.sqrt(statistics.variance), jnp.ones(3) / 3)
+    assert (jnp.abs(trajectory.action) > 1).any()
+    mean, log_std = jax.vmap(jax.vmap(moppo.policy(learner)), in_axes=0)(trajectory.observation)
+    z = (trajectory.action - mean) / jnp.exp(log_std)
+    expected = (-0.5 * z**2 - log_std - 0.5 * jnp.log(2 * jnp.pi)).sum(-1).reshape(-1)
+    np.testing.assert_allclose(batch.log_probability, expected, rtol=1e-5, atol=1e-5)
+
+
+def test_weights_on_raw_objectives_are_weights_on_scaled_ones_times_the_scale():
+    scale, weights = jnp.array([1.0, 4.0, 0.5]), jnp.array([0.2, 0.3, 0.5])
+    raw = MOPPO(ThreeWays(), PPOConfig(environments=2, rollout_steps=20, minibatches=1, weights_on="raw"))
+    scaled = MOPPO(ThreeWays(), PPOConfig(environments=2, rollout_steps=20, minibatches=1, weights_on="scaled"))
+    learner = raw.initial_learner(jax.random.key(0))
+    _, trajectory, _ = raw.collect(learner, raw.start_workers(jax.random.key(1)), jax.random.key(2))
+    np.testing.assert_allclose(
+        raw.batch(learner, trajectory, scale, weights).advantage,
+        scaled.batch(learner, trajectory, scale, weights * scale).advantage,
+        rtol=1e-5,
+        atol=1e-6,
+    )
+
+
+def test_the_critic_learns_one_value_for_each_objective():
+    moppo, learner = learned(OneStep())
+    np.testing.assert_allclose(values(moppo, learner, [0.0])[0], [1.0, -2.0], rtol=0.05)
+
+
+def test_a_later_reward_is_discounted():
+    moppo, learner = learned(TwoSteps())
+    np.testing.assert_allclose(values(moppo, learner, [0.0])[0], [0.9, -1.8], rtol=0.05)
+    np.testing.assert_allclose(values(moppo, learner, [1.0])[0], [1.0, -2.0], rtol=0.05)
+
+
+def test_a_time_limit_is_not_an_end():
+    """Bootstrapped across the limit the value is 1 / (1 - 0.9) = 10; treated as an end it would be below 7."""
+    moppo, learner = learned(Endless(), iterations=150)
+    np.testing.assert_allclose(values(moppo, learner, [0.0])[0], [10.0, -20.0], rtol=0.1)
+
+
+@pytest.mark.parametrize(("weights", "action"), [((1.0, 0.0), -0.8), ((0.25, 0.75), 0.4), ((0.0, 1.0), 0.8)])
+def test_the_weights_decide_what_is_learned(weights, action):
+    moppo, learner = learned(Compromise(), weights, weights_on="raw", initial_log_std=-1.0)
+    mean, _ = moppo.policy(learner)(jnp.zeros(1))
+    np.testing.assert_allclose(mean, [action], atol=0.1)
+
+
+def test_the_policy_depends_on_the_observation():
+    moppo, learner = learned(Follow(), initial_log_std=-1.0, iterations=60)
+    observations = jnp.linspace(-0.9, 0.9, 7)[:, None]
+    mean, _ = jax.vmap(moppo.policy(learner))(observations)
+    np.testing.assert_allclose(mean, observations, atol=0.2)
+
+
+def test_evaluation_counts_an_episode_once_to_its_end():
+    moppo, learner = learned(TwoSteps(), iterations=1)
+    returns = moppo.evaluate(learner, jax.random.split(jax.random.key(0), 3))
+    np.testing.assert_array_equal(returns.undiscounted, np.tile([1.0, -2.0], (3, 1)))
+    np.testing.assert_allclose(returns.discounted, np.tile([0.9, -1.8], (3, 1)), rtol=1e-6)
+    np.testing.assert_array_equal(returns.length, [2, 2, 2])
+    endless = MOPPO(Endless(), PPOConfig(**QUICK)).evaluate(learner, jax.random.split(jax.random.key(0), 3))
+    np.testing.assert_array_equal(endless.length, [10, 10, 10])

@@ -1,0 +1,135 @@
+"""A population is its agents, each as if it were alone, whatever the order and the number of devices."""
+
+import jax
+import numpy as np
+import pytest
+from jmorl.config import Config
+from jmorl.learning.moppo import MOPPO
+from jmorl.learning.population import Population, TrainingFault, device_count
+
+from tests.probes import Faulty, ThreeWays
+
+CONFIG = Config(
+    population={"agents": 4, "warmup_iterations": 2, "iterations": 3},
+    ppo={"environments": 3, "rollout_steps": 16, "minibatches": 4, "epochs": 2},
+    evaluation={"episodes": 2},
+)
+WEIGHTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.3, 0.5]])
+ITERATIONS = 3
+
+
+def compiled(environment, config=CONFIG, episodes=2):
+    population = Population(environment, config)
+    population.compile(jax.random.split(jax.random.key(9), episodes))
+    return population
+
+
+@pytest.fixture(scope="module")
+def population():
+    return compiled(ThreeWays())
+
+
+@pytest.fixture(scope="module")
+def start(population):
+    return population.initialize(jax.random.key(0))
+
+
+def agent(tree, index):
+    return jax.tree.map(lambda leaf: leaf[index], tree)
+
+
+def assert_close(left, right, tolerance=1e-5):
+    for a, b in zip(jax.tree.leaves(left), jax.tree.leaves(right), strict=True):
+        np.testing.assert_allclose(a, b, rtol=tolerance, atol=tolerance)
+
+
+def test_agents_start_different(start):
+    kernels = start.parameters["actor"]["params"]["MLP_0"]["Dense_0"]["kernel"]
+    assert len(np.unique(kernels.reshape(len(kernels), -1), axis=0)) == len(kernels)
+
+
+def test_an_agent_in_the_population_is_the_agent_alone(population, start):
+    key = jax.random.key(1)
+    together, _ = population.train(start, WEIGHTS, key, ITERATIONS)
+    alone = jax.jit(MOPPO(ThreeWays(), CONFIG.ppo).train)
+    for index, agent_key in enumerate(jax.random.split(key, 4)):
+        single, _ = alone(agent(start, index), WEIGHTS[index].astype(np.float32), agent_key, ITERATIONS)
+        assert_close(agent(together, index), single, 1e-4)
+
+
+def test_permuted_agents_give_permuted_results(population, start):
+    """In one call only tasks differ between agents, so their order must not matter, given the keys."""
+    order = np.array([2, 0, 3, 1])
+    keys = jax.random.split(jax.random.key(1), 4)
+    plain, _ = population._train(start, WEIGHTS.astype(np.float32), keys, np.int32(ITERATIONS))
+    permuted, _ = population._train(
+        agent(start, order), WEIGHTS[order].astype(np.float32), keys[order], np.int32(ITERATIONS)
+    )
+    assert_close(agent(jax.device_get(plain), order), jax.device_get(permuted))
+
+
+def test_one_device_or_two_is_the_same(population, start, monkeypatch):
+    assert len(population.devices) == 2
+    monkeypatch.setattr("jmorl.learning.population.device_count", lambda agents, available: 1)
+    single = compiled(ThreeWays())
+    assert len(single.devices) == 1
+    assert_close(
+        population.train(start, WEIGHTS, jax.random.key(1), ITERATIONS),
+        single.train(start, WEIGHTS, jax.random.key(1), ITERATIONS),
+        1e-4,
+    )
+
+
+def test_agents_with_the_same_parent_differ_by_their_keys(population, start):
+    same = agent(start, np.zeros(4, int))
+    trained, _ = population.train(same, np.tile(WEIGHTS[3], (4, 1)), jax.random.key(1), 1)
+    kernels = trained.parameters["actor"]["params"]["MLP_0"]["Dense_0"]["kernel"]
+    assert len(np.unique(kernels.reshape(4, -1), axis=0)) == 4
+
+
+def test_after_compiling_nothing_is_traced_or_compiled_again(population, start):
+    import jax.monitoring
+
+    events = []
+    jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: events.append(event))
+    population.train(start, WEIGHTS, jax.random.key(1), 1)  # keys are split here for the first time
+    events.clear()
+    trained, _ = population.train(start, WEIGHTS, jax.random.key(2), 2)
+    population.evaluate(trained, jax.random.split(jax.random.key(9), 2))
+    assert not [event for event in events if "trac" in event or "compile" in event]
+    jax.jit(lambda x: x + 1)(np.ones(3))
+    assert [event for event in events if "compile" in event], "the listener must see a compilation"
+
+
+def test_evaluation_is_repeatable_and_leaves_the_learner_alone(population, start):
+    keys = jax.random.split(jax.random.key(9), 2)
+    before = jax.tree.map(np.copy, start)
+    first, second = population.evaluate(start, keys), population.evaluate(start, keys)
+    np.testing.assert_array_equal(first.undiscounted, second.undiscounted)
+    for a, b in zip(jax.tree.leaves(before), jax.tree.leaves(start), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(("agents", "available", "expected"), [(6, 2, 2), (6, 4, 3), (5, 4, 1), (6, 8, 6), (7, 7, 7)])
+def test_devices_divide_the_population(agents, available, expected):
+    assert device_count(agents, available) == expected
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("where", ["observation", "reward"])
+def test_numbers_that_are_not_finite_are_found_in_their_iteration_and_named(where, value):
+    # Episodes of ten steps and rollouts of four: the seventh step of an episode falls into the second rollout.
+    config = CONFIG.replace(ppo={"rollout_steps": 4, "environments": 2, "minibatches": 2})
+    population = compiled(Faulty(where, breaks_at=7, value=value), config)
+    start = population.initialize(jax.random.key(0))
+    population.train(start, WEIGHTS, jax.random.key(1), 1)
+    with pytest.raises(TrainingFault, match=f"agent 0: {where} is not finite in iteration 2; agent 1") as error:
+        population.train(start, WEIGHTS, jax.random.key(1), 3)
+    assert str(error.value).count("agent") == 4
+
+
+def test_a_broken_learner_is_found_and_named(population, start):
+    broken = jax.tree.map(np.copy, start)
+    broken.parameters["critic"]["params"]["Dense_0"]["bias"][2] = np.nan
+    with pytest.raises(TrainingFault, match="^agent 2: loss is not finite in iteration 1$"):
+        population.train(broken, WEIGHTS, jax.random.key(1), 2)
