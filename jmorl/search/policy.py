@@ -1,0 +1,31 @@
+"""One evaluated policy: where it came from, what it scores, and the learner's state behind it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Policy:
+    """Everything known of one policy, in one record, so that policy and score cannot drift apart.
+
+    Compared by identity; `id` is unique within a run. The search reads `values` and never
+    looks into `snapshot`.
+    """
+
+    id: int
+    generation: int  # 0: the warm-up
+    parent: int | None  # id of the policy whose training was continued
+    weights: np.ndarray  # [M] the weights it was trained with
+    values: np.ndarray  # [M] z, its score: maximised
+    spread: np.ndarray  # [M] standard deviation of the score over the evaluation episodes
+    discounted: np.ndarray  # [M] mean discounted return
+    snapshot: Any = field(repr=False)  # parameters, optimiser state and statistics
+    predicted: np.ndarray | None = None  # [M] the values the search expected; None in the warm-up
+
+
+def values_of(policies: Sequence[Policy]) -> np.ndarray:  # [N, M]
+    """The objective vectors of at least one policy, stacked."""
+    return np.stack([policy.values for policy in policies])

@@ -1,0 +1,89 @@
+"""Scales and bounds: what they map to what, and that units do not matter."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from jmorl.search.bounds import lower_bounds, within
+from jmorl.search.scaling import range_scale, search_scale
+
+finite = st.floats(-1e4, 1e4)
+vector_sets = st.integers(1, 4).flatmap(
+    lambda m: arrays(float, st.tuples(st.integers(1, 8), st.just(m)), elements=finite)
+)
+vectors = arrays(float, 3, elements=finite)
+amounts = arrays(float, 3, elements=st.floats(0, 1e4))
+
+ANYWHERE = np.full(2, -np.inf)
+REFERENCE = np.array([-10.0, -20.0])
+
+
+def test_range_becomes_zero_to_one() -> None:
+    values = np.array([[-10.0, 3.0, 7.0], [30.0, 5.0, 7.0], [0.0, 4.0, 7.0]])
+    np.testing.assert_allclose(range_scale(values).apply(values), [[0, 0, 0], [1, 1, 0], [0.25, 0.5, 0]])
+
+
+@given(vector_sets)
+def test_scaled_values_lie_in_the_unit_box_and_come_back(values: np.ndarray) -> None:
+    scale = range_scale(values)
+    scaled = scale.apply(values)
+    assert (scaled >= 0).all() and (scaled <= 1).all()
+    np.testing.assert_allclose(scale.invert(scaled), values, rtol=1e-9, atol=1e-9)
+
+
+def test_one_vector_or_an_equal_range_keeps_its_unit() -> None:
+    np.testing.assert_array_equal(range_scale(np.array([[3.0, 4.0, 5.0]])).apply(np.array([4.0, 2.0, 5.0])), [1, -2, 0])
+
+
+def test_search_scale_is_the_range_within_the_bounds() -> None:
+    values = np.array([[0.0, 9.0], [4.0, 5.0], [6.0, 3.0], [9.0, 0.0]])
+    scale = search_scale(values, np.array([3.0, 2.0]), REFERENCE, "range")
+    np.testing.assert_array_equal(scale.apply(values), [[-2, 3], [0, 1], [1, 0], [2.5, -1.5]])
+
+
+@pytest.mark.parametrize("bounds", [ANYWHERE, np.array([5.0, 1.0]), np.array([99.0, 99.0])])
+def test_search_scale_is_the_whole_range_with_fewer_than_two_within(bounds: np.ndarray) -> None:
+    values = np.array([[0.0, 9.0], [4.0, 5.0], [6.0, 3.0], [9.0, 0.0]])
+    np.testing.assert_array_equal(search_scale(values, bounds, REFERENCE, "range").apply(values), values / 9)
+
+
+def test_unscaled_search_is_relative_to_the_reference_point() -> None:
+    values = np.array([[0.0, 9.0], [4.0, 5.0]])
+    scale = search_scale(values, np.array([3.0, 2.0]), REFERENCE, "none")
+    np.testing.assert_array_equal(scale.apply(values), [[10, 29], [14, 25]])
+
+
+def test_bounds_by_hand() -> None:
+    bounds = lower_bounds(np.array([-100.0, 4.0, 0.0]), 0.1, np.array([1.0, 9.0, 5.0]))
+    np.testing.assert_allclose(bounds, [-101.0, 3.4, 0.0])
+
+
+@given(vectors, st.floats(0, 10), amounts)
+def test_bounds_never_exclude_the_choice(preferred: np.ndarray, delta: float, unit: np.ndarray) -> None:
+    assert (lower_bounds(preferred, delta, unit) <= preferred).all()
+    assert within(preferred[None], lower_bounds(preferred, delta, unit)).all()
+
+
+@given(vectors, st.floats(0, 10), st.floats(0, 10), amounts, amounts)
+def test_more_slack_never_raises_a_bound(
+    preferred: np.ndarray, delta: float, more: float, unit: np.ndarray, larger: np.ndarray
+) -> None:
+    bounds = lower_bounds(preferred, delta, unit)
+    assert (lower_bounds(preferred, delta + more, unit) <= bounds).all()
+    assert (lower_bounds(preferred, delta, unit + larger) <= bounds).all()
+
+
+@given(vectors, amounts, arrays(float, 3, elements=st.floats(1e-3, 1e3)))
+def test_bounds_with_a_unit_do_not_depend_on_units(preferred: np.ndarray, unit: np.ndarray, factor: np.ndarray) -> None:
+    bounds = lower_bounds(preferred, 0.1, unit)
+    rescaled = lower_bounds(factor * preferred, 0.1, factor * unit)
+    np.testing.assert_allclose(rescaled, factor * bounds, rtol=1e-9, atol=1e-12)
+
+
+def test_within_needs_every_objective() -> None:
+    values = np.array([[1.0, 1.0, 1.0], [1.0, 0.9, 2.0], [5.0, 5.0, 5.0]])
+    assert within(values, np.ones(3)).tolist() == [True, False, True]
+    assert within(values, np.full(3, -np.inf)).all()
+    assert within(np.zeros((0, 3)), np.ones(3)).shape == (0,)
