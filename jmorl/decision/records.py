@@ -1,0 +1,155 @@
+"""The decision log: one JSON object per line for every question answered, with what was shown.
+
+A steering or final decision:
+
+    {"format": 1, "purpose": "steer", "generation": 3, "policy": 17, "values": [-66.0, -57.3],
+     "stop": false, "generations": 1, "shown": [{"policy": 17, "values": [-66.0, -57.3]}, ...]}
+
+An answer of E-NAUTILUS, where `shown` has the policies that the points head for:
+
+    {"format": 1, "purpose": "enautilus", "generation": 9, "number": 0, "answer": {"point": 1}, "shown": [...]}
+
+with the answers {"point": index}, {"steps": back} and {"iterations_left": h, "points": n}. `stop`, `generations` and
+the `shown` of a decision may be left out of a log written by hand.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from jmorl.decision.protocol import Answer, Choose, PointAnswer, PointQuestion, Question
+from jmorl.search.policy import Policy
+
+FORMAT: Literal[1] = 1
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Values = Annotated[tuple[Finite, ...], Field(min_length=1)]  # [M], raw units
+
+
+class ScriptError(ValueError):
+    """A decision log that cannot be read, or does not fit the run it is replayed in."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A policy among which was chosen."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    policy: int
+    values: Values
+
+
+@dataclass(frozen=True)
+class DecisionRecord:
+    """An answered `Question`."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    purpose: Literal["steer", "final"]
+    generation: Annotated[int, Field(ge=1)]
+    policy: int
+    values: Values
+    stop: bool = False
+    generations: Annotated[int, Field(ge=1)] = 1
+    shown: tuple[Shown, ...] = ()
+    format: Literal[1] = FORMAT
+
+
+@dataclass(frozen=True)
+class PointRecord:
+    """An answered `PointQuestion`."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    generation: Annotated[int, Field(ge=0)]
+    number: Annotated[int, Field(ge=0)]
+    answer: PointAnswer
+    shown: tuple[Shown, ...]
+    purpose: Literal["enautilus"] = "enautilus"
+    format: Literal[1] = FORMAT
+
+    def __post_init__(self) -> None:
+        if isinstance(self.answer, Choose) and not 0 <= self.answer.point < len(self.shown):
+            raise ValueError(f"answer: point {self.answer.point} is none of the {len(self.shown)} shown, from 0")
+
+
+Record = DecisionRecord | PointRecord
+_RECORD: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator="purpose")])
+
+
+def decision_record(question: Question, answer: Answer) -> DecisionRecord:
+    """What the log keeps of a question and its answer. Raises ValueError for a purpose that is never logged."""
+    if question.purpose == "enautilus":
+        raise ValueError("a question of E-NAUTILUS is logged as the PointQuestion it belongs to")
+    chosen = question.policy(answer.policy)
+    return DecisionRecord(
+        question.purpose,
+        question.generation,
+        chosen.id,
+        _values(chosen),
+        answer.stop,
+        answer.generations,
+        _shown(question.front),
+    )
+
+
+def point_record(question: PointQuestion, answer: PointAnswer) -> PointRecord:
+    """What the log keeps of a question of E-NAUTILUS and its answer."""
+    return PointRecord(question.generation, question.number, answer, _shown(question.representatives))
+
+
+def to_json(record: Record) -> str:
+    """The record as one line, without a line break."""
+    return json.dumps({"format": FORMAT, **asdict(record)}, allow_nan=False)
+
+
+def from_json(line: str, name: str = "the record") -> Record:
+    """The record of a line. Raises ScriptError saying what is wrong with the record, called `name`."""
+    try:
+        fields = json.loads(line)
+    except json.JSONDecodeError as error:
+        raise ScriptError(f"{name} is not valid JSON: {error.msg} at column {error.colno}") from None
+    if not isinstance(fields, dict):
+        raise ScriptError(f"{name} is not a JSON object")
+    version = fields.get("format")
+    if isinstance(version, int) and version > FORMAT:
+        raise ScriptError(f"{name} has format {version}, newer than the format {FORMAT} known here; use a newer jmorl")
+    try:
+        return _RECORD.validate_json(line, strict=True)
+    except ValidationError as error:
+        problems = dict.fromkeys(map(_problem, error.errors()))
+        raise ScriptError(f"{name} is not a decision: {'; '.join(problems)}") from None
+
+
+def read_log(path: Path) -> list[Record]:
+    """All records of a log, in order; empty lines are skipped. Raises ScriptError naming file and line."""
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScriptError(f"cannot read the decision log {path}: {error}") from None
+    return [from_json(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1) if line.strip()]
+
+
+def _values(policy: Policy) -> tuple[float, ...]:
+    return tuple(policy.values.tolist())
+
+
+def _shown(policies: Iterable[Policy]) -> tuple[Shown, ...]:
+    return tuple(Shown(policy.id, _values(policy)) for policy in policies)
+
+
+def _problem(error: Any) -> str:
+    """One of pydantic's errors as `field: what is wrong`."""
+    if not error["loc"]:
+        return 'purpose: should be "steer", "final" or "enautilus"'
+    if error["type"] == "value_error":
+        return str(error["ctx"]["error"])
+    _, *where = error["loc"]
+    if where[0] == "answer":
+        return 'answer: should be {"point": i}, {"steps": n} or {"iterations_left": h, "points": n}'
+    return f"{'.'.join(map(str, where))}: {error['msg'][0].lower()}{error['msg'][1:]}"

@@ -1,0 +1,84 @@
+"""A user who decides as a decision log says: the same run again, or a run that somebody prepared."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from jmorl.decision.protocol import Answer, Choose, DecisionMaker, PointAnswer, PointQuestion, Question
+from jmorl.decision.records import DecisionRecord, PointRecord, ScriptError, read_log
+from jmorl.search.policy import Policy
+
+R = TypeVar("R", DecisionRecord, PointRecord)
+
+
+class ScriptedUser(DecisionMaker):
+    """Replays the decision log at `path`; see `jmorl.decision.records`.
+
+    A line that goes back to an earlier question of its purpose replaces that decision and all that followed it. A run
+    stops where the log has only a final choice left. Raises ScriptError if the log cannot be read, has no answer to a
+    question, or chose a policy that the question does not show.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        records = read_log(path)
+        decisions = [record for record in records if isinstance(record, DecisionRecord)]
+        self._steering = _timeline(record for record in decisions if record.purpose == "steer")
+        self._final = _timeline(record for record in decisions if record.purpose == "final")
+        self._points = _timeline(record for record in records if isinstance(record, PointRecord))
+
+    def answer(self, question: Question) -> Answer:
+        place = question.generation, 0
+        steering = self._steering.get(place) if question.purpose == "steer" else None
+        record = steering or self._final.get(place)
+        if record is None:
+            generations = sorted(generation for generation, _ in self._steering | self._final)
+            raise ScriptError(
+                f"{self.path} has no decision for generation {question.generation}, only for {generations}; add that "
+                "decision to it, or replay it with the settings of the run that wrote it"
+            )
+        index = self._find(record.policy, record.values, question.front, question.generation)
+        stop = record.stop or (question.purpose == "steer" and steering is None)
+        return Answer(question.front[index].id, stop, record.generations)
+
+    def choose_point(self, question: PointQuestion) -> PointAnswer:
+        record = self._points.get((question.generation, question.number))
+        if record is None:
+            raise ScriptError(
+                f"{self.path} has no answer number {question.number} in E-NAUTILUS at generation "
+                f"{question.generation}; add it, or replay the file with the settings of the run that wrote it"
+            )
+        if not isinstance(record.answer, Choose):
+            return record.answer
+        chosen = record.shown[record.answer.point]
+        return Choose(self._find(chosen.policy, chosen.values, question.representatives, question.generation))
+
+    def _find(self, policy: int, values: tuple[float, ...], shown: tuple[Policy, ...], generation: int) -> int:
+        """The index of the shown policy with these values; if there are several, rather the one with this id.
+
+        The id alone proves nothing: every run numbers its policies from zero.
+        """
+        wanted = np.array(values)
+        matches = [
+            (each.id != policy, float(np.abs(each.values - wanted).max()), index)
+            for index, each in enumerate(shown)
+            if each.values.shape == wanted.shape and np.allclose(each.values, wanted)
+        ]
+        if not matches:
+            raise ScriptError(
+                f"{self.path} chose policy {policy} with values {list(values)} at generation {generation}, but no such "
+                "policy is shown here: the log is of another run; compare environment, seed and settings"
+            )
+        return min(matches)[-1]
+
+
+def _timeline(records: Iterable[R]) -> dict[tuple[int, int], R]:
+    """The records by generation and number, without those that a later line goes back behind."""
+    kept: dict[tuple[int, int], R] = {}
+    for record in records:
+        place = record.generation, record.number if isinstance(record, PointRecord) else 0
+        kept = {earlier: each for earlier, each in kept.items() if earlier < place}
+        kept[place] = record
+    return kept

@@ -1,0 +1,175 @@
+"""A person at a terminal, asked in text. Works with piped input, too."""
+
+from collections.abc import Callable
+
+from rich.console import Console
+
+from envs.core import Objective
+from jmorl.decision.protocol import (
+    Adjust,
+    Answer,
+    Back,
+    Choose,
+    DecisionMaker,
+    PointAnswer,
+    PointQuestion,
+    Question,
+)
+from jmorl.decision.terminal_view import show_front, show_points
+
+LONGEST_NUMBER = 9  # digits
+POLICY_HELP = """\
+  12           choose policy 12
+  Enter        keep your last choice
+  {more:<12} list the policies with the most of an objective first
+  12 go 5      choose policy 12, then no question for 5 generations (or go 5)
+  12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)
+  ?            this help"""
+POINT_HELP = """\
+  2            move to point 2: nothing will ever be worse than its worst values
+  back         undo the last choice; back 2 undoes two
+  iterations 4 take 4 more iterations to the front
+  points 5     show up to 5 points in each
+  q            end here, or with Ctrl-D, with the policy nearest to where you are
+  ?            this help"""
+
+
+class TerminalUser(DecisionMaker):
+    """Shows each question on `console` and takes the answer from `read`, which is given a prompt as `input` is.
+
+    An answer that makes no sense is explained and asked for again. Raises EOFError if the input ends when there is no
+    choice to end the run with.
+    """
+
+    def __init__(self, console: Console | None = None, read: Callable[[str], str] = input):
+        self.console = console or Console()
+        self.read = read
+
+    def answer(self, question: Question) -> Answer:
+        show_front(self.console, question, by=0)
+        while True:
+            line = self._line("policy (? for help) > ")
+            reply = policy_reply(question, "q" if line is None else line)
+            match reply:
+                case Answer():
+                    return reply
+                case int():
+                    show_front(self.console, question, by=reply)
+                case str() if line is None:
+                    raise EOFError("the input ended before a policy was chosen; continue the run to be asked again")
+                case str():
+                    self._say(reply)
+
+    def choose_point(self, question: PointQuestion) -> PointAnswer:
+        show_points(self.console, question)
+        while True:
+            line = self._line("point (? for help) > ")
+            reply = point_reply(question, "q" if line is None else line)
+            if not isinstance(reply, str):
+                return reply
+            self._say(reply)
+
+    def _line(self, prompt: str) -> str | None:
+        """What the person types; None at the end of the input."""
+        try:
+            return self.read(prompt)
+        except EOFError:
+            self.console.print()
+            return None
+        except UnicodeDecodeError:
+            return "?"
+
+    def _say(self, sentence: str) -> None:
+        # What people type must not be taken for rich's markup.
+        self.console.print(sentence, markup=False, highlight=False)
+
+
+def policy_reply(question: Question, line: str) -> Answer | int | str:
+    """What a line means: an answer, an objective's index to list the front by, or a sentence to say and ask again."""
+    words = line.lower().split()
+    if words[:1] in (["?"], ["help"]):
+        return POLICY_HELP.format(more=f"more {question.objectives[-1].name}")
+    if words[:1] == ["more"]:
+        return _objective(question.objectives, " ".join(words[1:]))
+    named = words.pop(0) if words and words[0] not in ("go", "q") else None
+    chosen = _policy(question, named)
+    if isinstance(chosen, str):
+        return chosen
+    match words:
+        case []:
+            return Answer(chosen)
+        case ["q"]:
+            return Answer(chosen, stop=True)
+        case ["go", number] if question.purpose == "steer" and (generations := _number(number)):
+            return Answer(chosen, generations=generations)
+        case ["go", *_] if question.purpose == "steer":
+            return "Say for how many generations to go on, for example: go 5"
+        case ["go", *_]:
+            return "The run has no generations left to go on for; choose the policy that is its result."
+    return f"I do not understand {line.strip()!r}; ? lists what you can type."
+
+
+def point_reply(question: PointQuestion, line: str) -> PointAnswer | str:
+    """What a line means: an answer, or a sentence to say and ask again."""
+    state, shown = question.state, len(question.points)
+    words = line.lower().split()
+    number = _number(words[1]) if len(words) == 2 else None
+    match words:
+        case ["?" | "help"]:
+            return POINT_HELP
+        case ["q"]:
+            return Adjust(iterations_left=0, points=state.points)
+        case ["back", *_] if not state.choices:
+            return "You are at the start; there is nothing to undo."
+        case ["back"]:
+            return Back(1)
+        case ["back", _] if number and number <= state.choices:
+            return Back(number)
+        case ["back", *_]:
+            return f"You can go back by 1 to {state.choices}, for example: back {state.choices}"
+        case ["iterations", _] if number:
+            return Adjust(number, state.points)
+        case ["points", _] if number:
+            return Adjust(state.iterations_left, number)
+        case ["iterations" | "points" as what, *_]:
+            return f"Say how many {what}, at least 1, for example: {what} 4"
+        case [word] if (chosen := _number(word)) and chosen <= shown:
+            return Choose(chosen - 1)
+    return f"Choose a point by its number, 1 to {shown}; ? lists what else you can type."
+
+
+def _policy(question: Question, named: str | None) -> int | str:
+    """The id of the policy somebody named, or of the last choice; a sentence if the front has no such policy."""
+    ids, previous = [policy.id for policy in question.front], question.previous
+    hint = f"choose a policy by its number, for example {ids[0]}, or type ? for help"
+    if named is None and previous is None:
+        return f"There is no last choice yet; {hint}."
+    if named is None and previous not in ids:
+        return f"Your last choice is no longer in the front; {hint}."
+    number = previous if named is None else _number(named)
+    if number is None:
+        return f"I do not understand {named!r}; {hint}."
+    if number not in ids:
+        return f"There is no policy {number} in this front; it has {', '.join(map(str, sorted(ids)))}."
+    return number
+
+
+def _objective(objectives: tuple[Objective, ...], named: str) -> int | str:
+    """The index of the one objective with this number, or whose name or label begins like this; else a sentence."""
+    number = _number(named)
+    if number and number <= len(objectives):
+        return number - 1
+    matching = [
+        index
+        for index, objective in enumerate(objectives)
+        if named and any(text.lower().startswith(named) for text in (objective.name, objective.label))
+    ]
+    if len(matching) == 1:
+        return matching[0]
+    names = ", ".join(f"{number} {objective.name}" for number, objective in enumerate(objectives, start=1))
+    return f"More of what? Name one of the objectives: {names}. For example: more {objectives[0].name}"
+
+
+def _number(word: str) -> int | None:
+    """The whole number that the word is, if it is one, and short enough to have been meant."""
+    return int(word) if word.isdecimal() and len(word) <= LONGEST_NUMBER else None

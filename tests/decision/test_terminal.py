@@ -1,0 +1,310 @@
+"""The person at a terminal: every command, every mistake, and what is shown."""
+
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from envs.core import Objective
+from jmorl.decision import enautilus as en
+from jmorl.decision.navigation import run_enautilus
+from jmorl.decision.protocol import Adjust, Answer, Back, Choose, PointQuestion
+from jmorl.decision.terminal import TerminalUser
+
+# Policies 10, 11, 12 in the tests below.
+VALUES = [[-70, -40], [-66.25, -57], [-100, -20]]
+HAND = np.array([[0, 12], [1, 11], [2, 10], [10, 4], [11, 3], [12, 0]], float)
+
+
+class Session:
+    """A user with prepared input, and what was printed."""
+
+    def __init__(self, *lines: str, width: int = 100):
+        self.remaining = list(lines)
+        self.prompts: list[str] = []
+        self.file = io.StringIO()
+        self.user = TerminalUser(Console(file=self.file, width=width), self.read)
+
+    def read(self, prompt: str) -> str:
+        self.prompts.append(prompt)
+        if not self.remaining:
+            raise EOFError
+        return self.remaining.pop(0)
+
+    @property
+    def output(self) -> str:
+        return self.file.getvalue()
+
+    @property
+    def sentences(self) -> str:
+        """All that was printed as running text."""
+        return " ".join(self.output.split())
+
+
+@pytest.fixture
+def point_question(front_of, objectives_of):
+    """The second question of a dialogue on `HAND`, two iterations before the end."""
+
+    def make(choices: int = 1) -> PointQuestion:
+        state = en.begin(HAND, 3, 2)
+        for _ in range(choices):
+            state = en.choose(state, en.intermediate_points(state)[0])
+        return PointQuestion(5, choices, objectives_of(2), front_of(HAND), state, en.intermediate_points(state))
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("12", Answer(12)),
+        ("  12\t", Answer(12)),
+        ("", Answer(11)),
+        ("go 5", Answer(11, generations=5)),
+        ("12 go 5", Answer(12, generations=5)),
+        ("12 GO 1", Answer(12, generations=1)),
+        ("q", Answer(11, stop=True)),
+        ("12 q", Answer(12, stop=True)),
+    ],
+)
+def test_commands(ask, line, answer):
+    session = Session(line)
+    assert session.user.answer(ask(VALUES, previous=11)) == answer
+    assert len(session.prompts) == 1
+
+
+def test_the_end_of_the_input_is_the_same_as_q(ask):
+    assert Session().user.answer(ask(VALUES, previous=11)) == Answer(11, stop=True)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("99", "There is no policy 99 in this front; it has 10, 11, 12."),
+        ("1" * 5000, "choose a policy by its number, for example 10"),
+        ("-1", "I do not understand '-1'; choose a policy by its number"),
+        ("12.0", "I do not understand '12.0'"),
+        ("[/red]", "I do not understand '[/red]'"),
+        ("12 please", "I do not understand '12 please'; ? lists what you can type."),
+        ("12 11", "I do not understand '12 11'"),
+        ("12 q now", "I do not understand '12 q now'"),
+        ("q 12", "I do not understand 'q 12'"),
+        ("go", "Say for how many generations to go on, for example: go 5"),
+        ("go 0", "Say for how many generations"),
+        ("12 go -3", "Say for how many generations"),
+        ("12 go x", "Say for how many generations"),
+        ("99 go 5", "There is no policy 99"),
+        ("more", "More of what? Name one of the objectives: 1 time, 2 fuel. For example: more time"),
+        ("more speed", "More of what?"),
+        ("more 0", "More of what?"),
+        ("more 3", "More of what?"),
+    ],
+)
+def test_mistakes_are_explained_and_asked_again(ask, line, sentence):
+    session = Session(line, "12")
+    assert session.user.answer(ask(VALUES, previous=11)) == Answer(12)
+    assert sentence in session.sentences
+    assert len(session.prompts) == 2
+    # The tables are not repeated.
+    assert session.output.count("which of these") == 1
+
+
+@pytest.mark.parametrize("line", ["", "q", "go 5"])
+@pytest.mark.parametrize(
+    ("previous", "sentence"), [(None, "There is no last choice yet"), (9, "no longer in the front")]
+)
+def test_without_a_last_choice_in_the_front_one_must_choose(ask, line, previous, sentence):
+    session = Session(line, "12")
+    assert session.user.answer(ask(VALUES, previous=previous)) == Answer(12)
+    assert f"{sentence}; choose a policy by its number, for example 10" in session.sentences
+
+
+def test_the_input_ending_before_any_choice_is_an_error_not_a_loop(ask):
+    with pytest.raises(EOFError, match="before a policy was chosen; continue the run to be asked again"):
+        Session("what?").user.answer(ask(VALUES))
+
+
+def test_undecodable_input_gets_the_help(ask):
+    session = Session()
+
+    def read(prompt: str) -> str:
+        session.prompts.append(prompt)
+        return b"\xff".decode() if len(session.prompts) == 1 else "12"
+
+    assert TerminalUser(session.user.console, read).answer(ask(VALUES)) == Answer(12)
+    assert "keep your last choice" in session.output
+
+
+@pytest.mark.parametrize("line", ["?", "help"])
+def test_help(ask, line):
+    session = Session(line, "10", width=79)
+    session.user.answer(ask(VALUES))
+    for text in (
+        "  12           choose policy 12\n",
+        "  Enter        keep your last choice\n",
+        "  more fuel    list the policies with the most of an objective first\n",
+        "  12 go 5      choose policy 12, then no question for 5 generations (or go 5)\n",
+        "  12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)\n",
+    ):
+        assert text in session.output
+
+
+def order_shown(session: Session) -> list[list[str]]:
+    """The policies of each table, from top to bottom."""
+    tables: list[list[str]] = []
+    for line in session.output.splitlines():
+        if "policy ┃" in line:
+            tables.append([])
+        elif line.startswith("│"):
+            tables[-1].append(line.split()[1])
+    return tables
+
+
+@pytest.mark.parametrize("line", ["more fuel", "more 2", "more f", "more FUEL LABEL"])
+def test_more_lists_the_front_by_that_objective(ask, line):
+    session = Session(line, "10")
+    session.user.answer(ask(VALUES))
+    assert order_shown(session) == [["11", "10", "12"], ["12", "10", "11"]]
+
+
+def test_an_ambiguous_objective_is_asked_for_again(ask):
+    question = ask([[1, 2], [2, 1]])
+    objectives = (Objective("speed x", "speed x", "m"), Objective("speed y", "speed y", "m"))
+    session = Session("more speed", "more speed y", "10")
+    session.user.answer(type(question)("steer", 1, objectives, question.front, question.bounds, None))
+    assert "More of what? Name one of the objectives: 1 speed x, 2 speed y" in session.sentences
+    assert order_shown(session) == [["11", "10"], ["10", "11"]]
+
+
+def test_what_the_question_shows(ask):
+    session = Session("10")
+    session.user.answer(ask(VALUES, generation=4, previous=11, bounds=[-90, -60]))
+    assert "Generation 4: which of these 3 policies do you prefer?" in session.output
+    assert "time label (time unit)" in session.output and "fuel label (fuel unit)" in session.output
+    rows = {line.split()[1]: line for line in session.output.splitlines() if line.startswith("│")}
+    assert "-66.25 ± 0.50" in rows["11"] and "last choice" in rows["11"] and "generation 1" in rows["11"]
+    assert "outside the bounds" in rows["12"] and "outside" not in rows["10"]
+    assert "x: your last choice" in session.output
+    assert all(len(line) <= 100 for line in session.output.splitlines())
+
+
+def test_the_plot_puts_policies_where_they_are(ask):
+    session = Session("10")
+    session.user.answer(ask([[0, 10], [10, 0]], previous=11))
+    plot = session.output[session.output.index("(fuel label)") :]
+    rows = [line for line in plot.splitlines() if "|" in line and "-|-" not in line]
+    (high,) = (line for line in rows if " o " in line)
+    (low,) = (line for line in rows if " x " in line)
+    assert rows.index(high) < rows.index(low) and high.index("o") < low.index("x")
+    assert plot.split("o: a policy")[0].isascii()
+
+
+def test_other_numbers_of_objectives_have_a_table_and_no_plot(ask):
+    for values in ([[1], [2]], [[1, 2, 3], [3, 2, 1]], [[1, 2, 3, 4], [4, 3, 2, 1]]):
+        session = Session("11")
+        assert session.user.answer(ask(values)) == Answer(11)
+        assert "o: a policy" not in session.output
+
+
+@pytest.mark.parametrize("values", [[[5, 5]], [[5, 5], [5, 5]], [[0, 0]], [[1e-9, 1e12], [2e-9, 1e12]]])
+@pytest.mark.parametrize("width", [20, 80, 200])
+def test_fronts_without_range_and_odd_widths_can_be_shown(ask, values, width):
+    session = Session("10", width=width)
+    assert session.user.answer(ask(values)) == Answer(10)
+
+
+def test_values_that_differ_look_different(ask):
+    session = Session("10")
+    session.user.answer(ask([[1000.0, 0.001], [1000.5, 0.0005]]))
+    for text in ("1000.0000", "1000.5000", "0.0010000", "0.0005000"):
+        assert text in session.output
+
+
+def test_the_final_question(ask):
+    session = Session("go 5", "12 go 5", "12")
+    assert session.user.answer(ask(VALUES, purpose="final", previous=11)) == Answer(12)
+    assert "The run is over. Which of these 3 policies is its result?" in session.output
+    assert session.sentences.count("The run has no generations left to go on for") == 2
+    assert Session("").user.answer(ask(VALUES, purpose="final", previous=11)) == Answer(11)
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("1", Choose(0)),
+        (" 2 ", Choose(1)),
+        ("back", Back(1)),
+        ("back 2", Back(2)),
+        ("iterations 4", Adjust(4, 2)),
+        ("points 5", Adjust(1, 5)),
+        ("POINTS 5", Adjust(1, 5)),
+        ("q", Adjust(0, 2)),
+    ],
+)
+def test_point_commands(point_question, line, answer):
+    session = Session(line)
+    question = point_question(choices=2)
+    assert question.state.iterations_left == 1
+    assert session.user.choose_point(question) == answer
+    assert len(session.prompts) == 1
+
+
+def test_the_end_of_the_input_ends_the_dialogue_here(point_question):
+    assert Session().user.choose_point(point_question()) == Adjust(0, 2)
+
+
+@pytest.mark.parametrize(
+    ("choices", "line", "sentence"),
+    [
+        (1, "", "Choose a point by its number, 1 to 2; ? lists what else you can type."),
+        (1, "0", "Choose a point by its number, 1 to 2"),
+        (1, "3", "Choose a point by its number, 1 to 2"),
+        (1, "1 2", "Choose a point by its number"),
+        (1, "[bold]", "Choose a point by its number"),
+        (0, "back", "You are at the start; there is nothing to undo."),
+        (0, "back 1", "You are at the start"),
+        (2, "back 3", "You can go back by 1 to 2, for example: back 2"),
+        (2, "back 0", "You can go back by 1 to 2"),
+        (2, "back x", "You can go back by 1 to 2"),
+        (2, "back 1 2", "You can go back by 1 to 2"),
+        (1, "iterations", "Say how many iterations, at least 1, for example: iterations 4"),
+        (1, "iterations 0", "Say how many iterations, at least 1"),
+        (1, "points -2", "Say how many points, at least 1, for example: points 4"),
+        (1, "points " + "9" * 5000, "Say how many points"),
+    ],
+)
+def test_point_mistakes_are_explained_and_asked_again(point_question, choices, line, sentence):
+    session = Session(line, "1")
+    assert session.user.choose_point(point_question(choices)) == Choose(0)
+    assert sentence in session.sentences
+    assert len(session.prompts) == 2
+
+
+def test_point_help(point_question):
+    session = Session("?", "1")
+    session.user.choose_point(point_question())
+    for text in ("move to point 2", "undo the last choice", "iterations 4", "points 5", "Ctrl-D"):
+        assert text in session.output
+
+
+def test_what_a_question_about_points_shows(point_question):
+    session = Session("1")
+    question = point_question(choices=0)
+    session.user.choose_point(question)
+    assert "E-NAUTILUS, 3 iterations left, 6 of 6 policies reachable. Which point do you prefer?" in session.output
+    first, second = (line for line in session.output.splitlines() if line.startswith("│"))
+    # A third of the way from (0, 0) to (11, 3): neither (12, 0) nor the cluster on the left is as good everywhere.
+    assert [part for part in first.split() if part != "│"] == (
+        ["1", "3.67", "to", "11.00", "1.00", "to", "4.00", "33", "%", "2", "14", "(11.00,", "3.00)"]
+    )
+    assert second.split()[1] == "2" and "11 (1.00, 11.00)" in second
+    assert "+: you are here" in session.output
+    assert Session("1").user.choose_point(point_question(choices=2)) == Choose(0)
+
+
+def test_a_whole_dialogue(front_of, objectives_of):
+    session = Session("1", "back", "points 3", "3", "2", "1")
+    chosen = run_enautilus(front_of(HAND), objectives_of(2), session.user.choose_point, 2, 2, 1)
+    assert chosen.id in (10, 11, 12)
+    assert session.output.count("2 iterations left") == 3

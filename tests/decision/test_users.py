@@ -1,0 +1,110 @@
+"""Decision makers by name: what each name makes, and a sentence for everything that is wrong with one."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from jmorl.decision.scripted import ScriptedUser
+from jmorl.decision.target import TargetUser
+from jmorl.decision.terminal import TerminalUser
+from jmorl.decision.users import make_user, parse_user
+
+VALUES = np.array([[3.0, 1.0], [2.0, 2.5], [0.0, 9.0]])
+
+
+@pytest.mark.parametrize(
+    ("spec", "utilities"),
+    [
+        ("A", [2, 2.25, 4.5]),
+        ("B", [2.4, 2.15, 2.7]),
+        ("C", [1.6, 2.35, 6.3]),
+        (" A ", [2, 2.25, 4.5]),
+        ("weights=0.5,0.5", [2, 2.25, 4.5]),
+        ("weights=3,1", [2.5, 2.125, 2.25]),
+        ("weights=0, 2.0", [1, 2.5, 9]),
+        ("weights=1,1,chebyshev=4,10", [-4.5, -3.75, -2]),
+        ("weights=0,1,chebyshev=4,10", [-9, -7.5, -1]),
+    ],
+)
+def test_users_with_a_utility(objectives_of, spec, utilities):
+    np.testing.assert_allclose(make_user(spec, objectives_of(2)).utility(VALUES), utilities)
+
+
+def test_three_weights_are_normalised(objectives_of):
+    utility = make_user("weights=2,1,1", objectives_of(3)).utility(np.array([[1.0, 2.0, 6.0]]))
+    np.testing.assert_allclose(utility, [2.5])
+
+
+def test_chebyshev_without_a_utopian_point_reports_no_utility(ask, objectives_of):
+    user = make_user("weights=1,1,chebyshev", objectives_of(2))
+    assert user.utility(VALUES) is None
+    # Distances to the ideal (3, 9), halved: 4, 3.25, 1.5.
+    assert user.answer(ask(VALUES)).policy == 12
+
+
+def test_targets(objectives_of):
+    user = make_user("target=-80,-42", objectives_of(2))
+    assert isinstance(user, TargetUser) and user.target.tolist() == [-80, -42] and user.scaled
+    unscaled = make_user("target=-80, 4.2e1,unscaled", objectives_of(2))
+    assert isinstance(unscaled, TargetUser) and unscaled.target.tolist() == [-80, 42] and not unscaled.scaled
+
+
+def test_terminal_and_script(objectives_of, tmp_path):
+    assert isinstance(make_user("terminal", objectives_of(3)), TerminalUser)
+    log = tmp_path / "a=b,c.jsonl"
+    log.write_text("")
+    user = make_user(f"script={log}", objectives_of(3))
+    assert isinstance(user, ScriptedUser) and user.path == log
+
+
+@pytest.mark.parametrize("spec", ["A", "weights=1,2,3", "weights=1,2,chebyshev", "target=1", "terminal"])
+def test_without_a_known_number_of_objectives_any_number_passes(spec):
+    parse_user(spec, None)
+
+
+@pytest.mark.parametrize(
+    ("spec", "objectives", "problem"),
+    [
+        ("D", 2, "unknown user 'D'; known: A, B, C, weights=.*, target=.*, terminal, script=FILE"),
+        ("", 2, "unknown user ''"),
+        ("a", 2, "unknown user 'a'"),
+        ("A=1", 2, "unknown user 'A=1'"),
+        ("weights", 2, "unknown user 'weights'"),
+        ("target", 2, "unknown user 'target'"),
+        ("terminal=1", 2, "unknown user 'terminal=1'"),
+        ("A", 3, "user A has weights for two objectives, but there are 3; write weights=W1,W2"),
+        ("weights=1,2,3", 2, "weights must have one number for each of 2 objectives, not 3: 1,2,3"),
+        ("weights=1", 2, "weights must have one number for each of 2 objectives, not 1: 1"),
+        ("weights=", None, "weights must be numbers separated by commas, but '' is none"),
+        ("weights=1,x", None, "but 'x' is none"),
+        ("weights=0.5;0.5", None, "but '0.5;0.5' is none"),
+        ("weights=1,nan", None, "weights must be finite numbers, but 'nan' is not"),
+        ("weights=1,inf", None, "weights must be finite numbers"),
+        ("weights=1,-0.5", None, "weights must not be negative: 1,-0.5"),
+        ("weights=0,0", None, "weights must have a finite sum above zero: 0,0"),
+        ("weights=1e308,1e308", None, "weights must have a finite sum above zero"),
+        ("weights=1,2,euclid", 2, "but 'euclid' is none"),
+        ("weights=1,2,chebyshevy", 2, "chebyshev must be numbers separated by commas, but 'y' is none"),
+        ("weights=1,2,chebyshev=", 2, "chebyshev must be numbers"),
+        ("weights=1,2,chebyshev=1", None, "chebyshev must have one number for each of 2 objectives, not 1: 1"),
+        ("target=1,2,3", 2, "target must have one number for each of 2 objectives, not 3: 1,2,3"),
+        ("target=1,nan", 2, "target must be finite numbers, but 'nan' is not"),
+        ("target=1,", None, "target must be numbers separated by commas, but '' is none"),
+        ("target=1,2,unscaled,3", None, "nothing may follow 'unscaled' in a target, but ',3' does"),
+        ("script=nowhere.jsonl", 2, "there is no decision log 'nowhere.jsonl'; write script=FILE with a file that"),
+        ("script=", 2, "there is no decision log ''"),
+        ("script=/", 2, "there is no decision log '/'"),
+    ],
+)
+def test_problems(spec, objectives, problem):
+    with pytest.raises(ValueError, match=problem):
+        parse_user(spec, objectives)
+
+
+def test_naming_users_loads_neither_plots_nor_clustering():
+    heavy = "{'plotille', 'scipy.cluster', 'jmorl.decision.terminal', 'jmorl.decision.scripted'}"
+    code = f"import sys, jmorl.decision.users; print(sorted({heavy} & set(sys.modules)))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert loaded.stdout.strip() == "[]"
