@@ -1,0 +1,251 @@
+"""The command line: arguments to config to run. No logic of its own.
+
+Exit codes: 0 done; 1 the run failed, what it had is kept; 2 bad input, nothing was made; 130 interrupted.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jmorl.config import PRESETS, Config, ConfigError, Section, resolve
+
+SETTING = "setting."  # marks the parsed options that are fields of the config
+EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command. Returns the exit code; argparse itself exits with 2 for unknown flags."""
+    options = _parser().parse_args(arguments)
+    from jmorl.decision.records import ScriptError
+    from jmorl.learning.devices import use_all_cpu_cores
+    from jmorl.learning.population import TrainingFault
+    from jmorl.storage.policy_file import PolicyFileError
+    from jmorl.storage.run_folder import FolderInUse
+    from jmorl.storage.stored_run import StoredRunError
+
+    use_all_cpu_cores()
+    try:
+        options.command(options)
+    except ConfigError as error:
+        return _failed(error.problems, EXIT_BAD_INPUT)
+    except (FolderInUse, PolicyFileError, ScriptError, StoredRunError) as error:
+        return _failed([str(error)], EXIT_BAD_INPUT)
+    except TrainingFault as error:
+        return _failed([f"the run stopped: {error}"], EXIT_FAILED)
+    except KeyboardInterrupt:
+        return _failed(["interrupted"], EXIT_INTERRUPTED)
+    return 0
+
+
+def _failed(problems: Sequence[str], code: int) -> int:
+    for problem in problems:
+        print(f"jmorl: {problem}", file=sys.stderr)
+    return code
+
+
+def _train(options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    import envs
+    from jmorl.report.plots import draw_run
+    from jmorl.report.progress import watcher
+    from jmorl.run import run
+    from jmorl.storage.run_folder import RunFolder
+    from jmorl.storage.stored_run import read_run
+
+    config = _checked_config(options)
+    environment = envs.make(config.env)
+    folder = RunFolder.create(options.out, config, environment, options.force)
+    console = Console()
+    kind = _display(options, config, console)
+    with watcher(kind, config, environment.objectives, console) as watch:
+        for event in run(config, environment=environment):
+            folder.record(event)
+            watch.show(event)
+    draw_run(read_run(folder.path), folder.path / "plots")
+    if kind not in ("quiet", "json"):
+        console.print(f"Everything is in [bold]{folder.path}[/bold]; the policy you chose is chosen.npz there.")
+
+
+def _checked_config(options: argparse.Namespace) -> Config:
+    """The config of the options; every problem, that of the output folder included, in one ConfigError."""
+    from jmorl.storage.run_folder import FolderInUse, check_free
+
+    problems = []
+    if options.out is None:
+        options.out = Path("runs") / time.strftime("%Y%m%d-%H%M%S")
+    try:
+        check_free(options.out, options.force)
+    except FolderInUse as error:
+        problems.append(f"out: {error}")
+    try:
+        config = resolve(options.preset, options.config, _overrides(options))
+    except ConfigError as error:
+        raise ConfigError(error.problems + problems) from None
+    if problems:
+        raise ConfigError(problems)
+    return config
+
+
+def _display(options: argparse.Namespace, config: Config, console: Any) -> str:
+    if options.json or options.quiet:
+        return "json" if options.json else "quiet"
+    return "live" if console.is_terminal and config.user != "terminal" else "lines"
+
+
+def _overrides(options: argparse.Namespace) -> dict[str, Any]:
+    """The settings given as flags, as nested as the config; values are still strings."""
+    overrides: dict[str, Any] = {}
+    for name, value in vars(options).items():
+        if name.startswith(SETTING) and value is not None:
+            *sections, field = name.removeprefix(SETTING).split(".")
+            inner = overrides
+            for section in sections:
+                inner = inner.setdefault(section, {})
+            inner[field] = value
+    return overrides
+
+
+def _evaluate(options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from jmorl.report.tables import evaluation_table
+    from jmorl.scoring import evaluate_stored
+    from jmorl.storage.policy_file import load_policy
+
+    path = options.policy / "chosen.npz" if options.policy.is_dir() else options.policy
+    policy = load_policy(path)
+    returns = evaluate_stored(policy, options.episodes, options.seed)
+    if options.json:
+        print(json.dumps({"policy": str(path), "seed": options.seed, "returns": returns.undiscounted.tolist()}))
+    else:
+        Console().print(evaluation_table(policy.header, returns))
+
+
+def _enautilus(options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from jmorl.decision.users import make_user
+    from jmorl.report.tables import front_table
+    from jmorl.storage.afterwards import choose_afterwards
+    from jmorl.storage.stored_run import read_run
+
+    stored = read_run(options.run)
+    try:
+        user = make_user(options.user or stored.config.user, stored.objectives)
+    except ValueError as error:
+        raise ConfigError([f"user: {error}"]) from error
+    chosen = choose_afterwards(stored, user, options.iterations, options.points)
+    if options.json:
+        print((options.run / "enautilus.json").read_text(), end="")
+    else:
+        Console().print(front_table(stored.front, stored.objectives, chosen_id=chosen.id))
+
+
+def _show(options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from jmorl.report.plots import draw_run
+    from jmorl.report.tables import run_tables
+    from jmorl.storage.stored_run import read_run
+
+    stored = read_run(options.run)
+    console = Console()
+    for table in run_tables(stored):
+        console.print(table)
+    for plot in draw_run(stored, options.run / "plots"):
+        console.print(f"plot: {plot}")
+
+
+def _envs(options: argparse.Namespace) -> None:
+    from rich.console import Console
+
+    from jmorl.report.tables import environments_table
+
+    Console().print(environments_table())
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="jmorl",
+        description="Interactive multi-objective reinforcement learning: train a population, choose, converge.",
+        epilog="Exit codes: 0 done, 1 the run failed (what it had is kept), 2 bad input (nothing was made), "
+        "130 interrupted.",
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_train(commands)
+
+    enautilus = commands.add_parser(
+        "enautilus", help="choose a policy from the front of a finished run, step by step (E-NAUTILUS)"
+    )
+    enautilus.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    enautilus.add_argument("--user", help="who decides, as in train (default: the run's own user)")
+    enautilus.add_argument("--iterations", type=_count, default=3, help="choices until the front (default: 3)")
+    enautilus.add_argument("--points", type=_count, default=3, help="points shown each time (default: 3)")
+    enautilus.add_argument("--json", action="store_true", help="print the chosen policy as JSON")
+    enautilus.set_defaults(command=_enautilus)
+
+    evaluate = commands.add_parser("evaluate", help="score a saved policy on fresh episodes")
+    evaluate.add_argument("policy", type=Path, metavar="POLICY", help="policy file, or a run folder for its choice")
+    evaluate.add_argument("--episodes", type=_count, default=100, help="default: 100")
+    evaluate.add_argument("--seed", type=int, default=0, help="of the start states (default: 0)")
+    evaluate.add_argument("--json", action="store_true", help="print every episode's returns as JSON")
+    evaluate.set_defaults(command=_evaluate)
+
+    show = commands.add_parser("show", help="print a run's tables and draw its plots")
+    show.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    show.set_defaults(command=_show)
+
+    listing = commands.add_parser("envs", help="list the environments")
+    listing.set_defaults(command=_envs)
+    return parser
+
+
+def _add_train(commands: Any) -> None:
+    train = commands.add_parser(
+        "train",
+        help="train a population, with a decision maker in the loop",
+        description="Preset, then config file, then flags: each overrides the one before.",
+        formatter_class=argparse.RawTextHelpFormatter,
+    )
+    train.set_defaults(command=_train)
+    train.add_argument("--preset", default="default", help=f"{', '.join(PRESETS)} (default: default)")
+    train.add_argument("--config", type=Path, metavar="FILE", help="settings as TOML, for instance a run's config.toml")
+    train.add_argument("--out", type=Path, metavar="FOLDER", help="run folder (default: runs/DATE-TIME)")
+    train.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
+    train.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    train.add_argument("--json", action="store_true", help="print one JSON object for each event")
+    _add_settings(train, train.add_argument_group("settings"), Config, "")
+
+
+def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Section], prefix: str) -> None:
+    """One flag for every field. Values stay strings here, so that the config can name all problems at once."""
+    for name, field in section.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, Section):
+            title = f"{name}: {(kind.__doc__ or '').splitlines()[0]}"
+            _add_settings(parser, parser.add_argument_group(title), kind, f"{prefix}{name}.")
+        else:
+            default = field.default if not isinstance(field.default, tuple) else ",".join(map(str, field.default))
+            shown = "" if default is None else f" ({default})"
+            group.add_argument(
+                f"--{prefix}{name}".replace("_", "-"),
+                dest=f"{SETTING}{prefix}{name}",
+                metavar=name.rpartition("_")[2].upper(),
+                help=f"{field.description}{shown}".replace("%", "%%"),
+            )
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, not {number}")
+    return number
+
+
+if __name__ == "__main__":
+    sys.exit(main())

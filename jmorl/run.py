@@ -1,0 +1,351 @@
+"""One run: warm-up, generations, final choice, as a generator of events.
+
+The only place that orders learning, search and decision (the paper's Algorithm 1). Everybody who watches a run,
+the command line, the run folder, a page, reads the same events.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import jax
+import numpy as np
+
+import envs
+from envs.core import Environment
+from jmorl.config import Config
+from jmorl.decision.protocol import Answer, DecisionMaker, Purpose, Question
+from jmorl.decision.users import make_user
+from jmorl.learning.moppo import Learner
+from jmorl.learning.population import Population
+from jmorl.scoring import Scores, raw_scores
+from jmorl.search.archive import Archive
+from jmorl.search.bounds import lower_bounds, within
+from jmorl.search.buffer import PerformanceBuffer
+from jmorl.search.metrics import (
+    FrontMetrics,
+    PredictionMetrics,
+    UtilityMetrics,
+    front_metrics,
+    prediction_metrics,
+    utility_metrics,
+)
+from jmorl.search.policy import Policy, values_of
+from jmorl.search.prediction import Records, predict
+from jmorl.search.scaling import Scale, range_scale, search_scale
+from jmorl.search.selection import Task, select_tasks
+from jmorl.search.weights import simplex_grid, spread_weights
+
+REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor the middle dominate a gain
+
+
+@dataclass(frozen=True)
+class RunState:
+    """All that a run knows between two generations."""
+
+    buffer: PerformanceBuffer
+    records: Records
+    bounds: np.ndarray  # [M] -inf before the first choice
+    archive: Archive = Archive()
+    reference_point: np.ndarray | None = None  # [M] of the reported hypervolume; None before the warm-up
+    choice: Policy | None = None  # what the decision maker chose last
+    silent_generations: int = 0  # still to go before the next question
+    generation: int = 0  # finished generations, the warm-up not counted
+    iterations: int = 0  # PPO iterations of every agent so far
+    evaluation_steps: int = 0
+    policies: int = 0  # evaluated so far: the id of the next one
+    questions: int = 0
+    policies_shown: int = 0
+
+
+@dataclass(frozen=True)
+class Seconds:
+    """Where the time of a generation went, waiting for an answer not counted."""
+
+    select: float = 0.0
+    train: float = 0.0
+    evaluate: float = 0.0
+
+    @property
+    def total(self) -> float:
+        return self.select + self.train + self.evaluate
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """The programs are compiled; nothing has been trained."""
+
+    seconds: float
+    devices: int
+
+
+@dataclass(frozen=True)
+class Decided:
+    """The decision maker has answered."""
+
+    question: Question
+    answer: Answer
+    chosen: Policy
+    bounds: np.ndarray  # [M] that follow from the choice; from a final one none do, so those in force
+    seconds: float  # how long the run waited for the answer
+
+
+@dataclass(frozen=True)
+class GenerationFinished:
+    """A generation (0: the warm-up) is trained, evaluated and in the archive."""
+
+    state: RunState
+    offspring: tuple[Policy, ...]
+    candidates: int  # policies the search could continue; 0 in the warm-up
+    steps: int  # environment steps used for learning so far
+    seconds: Seconds
+    steps_per_second: float  # of this generation, selection and evaluation included
+    front: FrontMetrics
+    utility: UtilityMetrics
+    prediction: PredictionMetrics
+
+
+@dataclass(frozen=True)
+class Lineage:
+    """Where the offspring of a generation come from."""
+
+    parents: Sequence[Policy]  # [P]
+    predicted: np.ndarray  # [P, M] raw units
+    candidates: int  # policies that could have been continued
+    select_seconds: float
+
+
+@dataclass(frozen=True)
+class RunFinished:
+    """The run is over; `chosen` is its result."""
+
+    state: RunState
+    chosen: Policy
+    reason: Literal["budget", "satisfied", "stopped"]
+
+
+Event = Compiled | Decided | GenerationFinished | RunFinished
+
+
+def run(
+    config: Config, decision_maker: DecisionMaker | None = None, environment: Environment[Any] | None = None
+) -> Iterator[Event]:
+    """Train and choose as `config` says, yielding an event for everything that happens.
+
+    `decision_maker` and `environment` default to those the config names. Raises TrainingFault in the generation
+    in which a number stops being finite; the events before it stand.
+    """
+    environment = environment or envs.make(config.env)
+    decision_maker = decision_maker or make_user(config.user, environment.objectives)
+    return _Run(config, environment, decision_maker).events()
+
+
+class _Run:
+    """What stays the same during a run, and the steps it is made of."""
+
+    def __init__(self, config: Config, environment: Environment[Any], decision_maker: DecisionMaker):
+        self.config = config
+        self.environment = environment
+        self.decision_maker = decision_maker
+        self.population = Population(environment, config)
+        self.candidate_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
+        self.initial_key, self.training_key, start_key = jax.random.split(jax.random.key(config.seed), 3)
+        self.start_keys = jax.random.split(start_key, config.evaluation.episodes)
+
+    def events(self) -> Iterator[Event]:
+        yield Compiled(self.population.compile(self.start_keys), len(self.population.devices))
+        finished = self.warm_up()
+        yield finished
+        state = finished.state
+        while self._budget_left(state) and not self._satisfied(state):
+            if self.config.method == "interactive" and not state.silent_generations:
+                decided = self.ask(state, "steer", state.archive.members)
+                yield decided
+                state = replace(
+                    _asked(state, decided), bounds=decided.bounds, silent_generations=decided.answer.generations
+                )
+                if decided.answer.stop:
+                    yield RunFinished(state, decided.chosen, "stopped")
+                    return
+            finished = self.generation(state)
+            yield finished
+            state = finished.state
+        decided = self.ask(state, "final", _within(state.archive.members, state.bounds))
+        yield decided
+        reason: Literal["budget", "satisfied"] = "satisfied" if self._satisfied(state) else "budget"
+        yield RunFinished(_asked(state, decided), decided.chosen, reason)
+
+    def warm_up(self) -> GenerationFinished:
+        """Generation 0: P new agents, with weights evenly spread."""
+        objectives = len(self.environment.objectives)
+        state = RunState(
+            PerformanceBuffer(self.config.search.buffer_bins, self.config.search.buffer_size),
+            Records.empty(objectives),
+            bounds=np.full(objectives, -np.inf),
+        )
+        weights = spread_weights(objectives, self.config.population.agents)
+        learners = self.population.initialize(self.initial_key)
+        return self._trained(state, learners, weights, self.config.population.warmup_iterations)
+
+    def generation(self, state: RunState) -> GenerationFinished:
+        """Select P tasks, train them, and take their offspring in."""
+        state = replace(state, generation=state.generation + 1, silent_generations=max(state.silent_generations - 1, 0))
+        started = time.perf_counter()
+        scale = self._scale(state)
+        candidates = self._candidates(state)
+        tasks = self._select(state, candidates, scale)
+        lineage = Lineage(
+            [candidates[task.candidate] for task in tasks],
+            scale.invert(np.stack([task.predicted for task in tasks])),
+            len(candidates),
+            time.perf_counter() - started,
+        )
+        learners = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in lineage.parents))
+        weights = self.candidate_weights[[task.weight for task in tasks]]
+        return self._trained(state, learners, weights, self.config.population.iterations, lineage)
+
+    def ask(self, state: RunState, purpose: Purpose, front: Sequence[Policy]) -> Decided:
+        """Put a question to the decision maker."""
+        previous = state.choice.id if state.choice else None
+        generation = state.generation + 1
+        question = Question(purpose, generation, self.environment.objectives, tuple(front), state.bounds, previous)
+        started = time.perf_counter()
+        answer = self.decision_maker.answer(question)
+        seconds = time.perf_counter() - started
+        chosen = question.policy(answer.policy)
+        bounds = self._bounds(state, chosen) if purpose == "steer" else state.bounds
+        return Decided(question, answer, chosen, bounds, seconds)
+
+    def _budget_left(self, state: RunState) -> bool:
+        return state.iterations < self.config.iteration_budget
+
+    def _satisfied(self, state: RunState) -> bool:
+        return self.decision_maker.satisfied(state.archive.values)
+
+    def _bounds(self, state: RunState, chosen: Policy) -> np.ndarray:
+        """The bounds that follow from a choice (the paper's equation 4)."""
+        values = state.archive.values
+        unit = np.ptp(values, axis=0) if self.config.search.bounds_scale == "range" else np.ones(values.shape[1])
+        return lower_bounds(chosen.values, self.config.search.delta, unit)
+
+    def _scale(self, state: RunState) -> Scale:
+        return search_scale(state.archive.values, state.bounds, _reference_point(state), self.config.search.value_scale)
+
+    def _candidates(self, state: RunState) -> list[Policy]:
+        """The policies whose training may be continued: the choice, always, and buffer members within the bounds."""
+        candidates = _within(state.buffer.members, state.bounds)
+        return candidates if state.choice is None or state.choice in candidates else [state.choice, *candidates]
+
+    def _select(self, state: RunState, candidates: list[Policy], scale: Scale) -> list[Task]:
+        """The tasks whose predicted offspring improve the front most, in the interactive search within the bounds."""
+        search = self.config.search
+        bounded = state.choice is not None and search.gain_within == "bounds"
+        front = _within(state.archive.members, state.bounds) if bounded else state.archive.members
+        if bounded:
+            reference = scale.apply(state.bounds)
+        elif search.value_scale == "range":
+            reference = np.full_like(state.bounds, -REFERENCE_MARGIN)
+        else:
+            reference = np.zeros_like(state.bounds)  # the scale's origin is the reference point
+        return select_tasks(
+            predict(scale.apply(values_of(candidates)), self.candidate_weights, state.records.scaled(scale)),
+            scale.apply(values_of(front)),
+            reference,
+            self.config.population.agents,
+            search.sparsity_weight,
+            np.random.default_rng([self.config.seed, state.generation]),
+        )
+
+    def _trained(
+        self,
+        state: RunState,
+        learners: Learner,
+        weights: np.ndarray,
+        iterations: int,
+        lineage: Lineage | None = None,
+    ) -> GenerationFinished:
+        """Train learners [P] with weights [P, M], evaluate them, and take them in."""
+        started = time.perf_counter()
+        key = jax.random.fold_in(self.training_key, state.generation)
+        learners, _ = self.population.train(learners, weights, key, iterations)
+        trained = time.perf_counter()
+        scores = raw_scores(self.population.evaluate(learners, self.start_keys))
+        evaluated = time.perf_counter()
+
+        offspring = _policies(state, learners, weights, scores, lineage)
+        state = self._taken_in(state, offspring, lineage)
+        state = replace(
+            state,
+            iterations=state.iterations + iterations,
+            evaluation_steps=state.evaluation_steps + scores.steps,
+            policies=state.policies + len(offspring),
+        )
+        seconds = Seconds(lineage.select_seconds if lineage else 0.0, trained - started, evaluated - trained)
+        return GenerationFinished(
+            state,
+            offspring,
+            lineage.candidates if lineage else 0,
+            state.iterations * self.config.steps_per_iteration,
+            seconds,
+            iterations * self.config.steps_per_iteration / seconds.total,
+            front_metrics(state.archive.values, _reference_point(state), self.candidate_weights),
+            utility_metrics(self.decision_maker.utility, state.archive.members, state.buffer.members, state.bounds),
+            prediction_metrics(lineage.parents if lineage else (), offspring, range_scale(state.archive.values)),
+        )
+
+    def _taken_in(self, state: RunState, offspring: tuple[Policy, ...], lineage: Lineage | None) -> RunState:
+        """The state with the offspring in archive, buffer and records."""
+        state = replace(state, archive=state.archive.offer(offspring))
+        if state.reference_point is None:
+            state = replace(state, reference_point=self._first_reference_point(offspring))
+        if lineage:
+            weights = np.stack([child.weights for child in offspring])
+            records = state.records.add(values_of(lineage.parents), weights, values_of(offspring))
+            state = replace(state, records=records)
+        return replace(state, buffer=state.buffer.offer(offspring, self._scale(state)))
+
+    def _first_reference_point(self, warmed_up: tuple[Policy, ...]) -> np.ndarray:
+        if self.config.reference_point is not None:
+            return np.array(self.config.reference_point)
+        return range_scale(values_of(warmed_up)).invert(np.array(-REFERENCE_MARGIN))
+
+
+def _policies(
+    state: RunState, learners: Learner, weights: np.ndarray, scores: Scores, lineage: Lineage | None
+) -> tuple[Policy, ...]:
+    """Learners [P] and their scores as records."""
+    return tuple(
+        Policy(
+            id=state.policies + index,
+            generation=state.generation,
+            parent=lineage.parents[index].id if lineage else None,
+            weights=weights[index],
+            values=scores.values[index],
+            spread=scores.spread[index],
+            discounted=scores.discounted[index],
+            snapshot=jax.tree.map(lambda leaf, index=index: leaf[index], learners),
+            predicted=lineage.predicted[index] if lineage else None,
+        )
+        for index in range(len(weights))
+    )
+
+
+def _within(policies: Sequence[Policy], bounds: np.ndarray) -> list[Policy]:
+    inside = within(values_of(policies), bounds)
+    return [policy for policy, kept in zip(policies, inside, strict=True) if kept]
+
+
+def _asked(state: RunState, decided: Decided) -> RunState:
+    """The state with a question counted and its choice noted."""
+    return replace(
+        state,
+        choice=decided.chosen,
+        questions=state.questions + 1,
+        policies_shown=state.policies_shown + len(decided.question.front),
+    )
+
+
+def _reference_point(state: RunState) -> np.ndarray:
+    assert state.reference_point is not None, "the warm-up sets it"
+    return state.reference_point

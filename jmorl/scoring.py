@@ -1,0 +1,47 @@
+"""From episodes to scores: what a policy is worth, in raw units.
+
+A score is the mean undiscounted return over the evaluation episodes: it means the same in every run and at
+every time of a run.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import envs
+from jmorl.learning.rollout import EpisodeReturns, episode_returns
+from jmorl.storage.policy_file import StoredPolicy
+
+
+class Scores(NamedTuple):
+    """The scores of P policies."""
+
+    values: np.ndarray  # [P, M] mean undiscounted return
+    spread: np.ndarray  # [P, M] standard deviation over the episodes
+    discounted: np.ndarray  # [P, M] mean discounted return
+    steps: int  # environment steps of all episodes
+
+
+def raw_scores(returns: EpisodeReturns) -> Scores:
+    """Score `EpisodeReturns` [P, episodes, M]. Means are taken in float64."""
+    undiscounted = np.asarray(returns.undiscounted, np.float64)
+    discounted = np.asarray(returns.discounted, np.float64)
+    return Scores(undiscounted.mean(1), undiscounted.std(1), discounted.mean(1), int(returns.length.sum()))
+
+
+def evaluate_stored(policy: StoredPolicy, episodes: int, seed: int) -> EpisodeReturns:
+    """Deterministic episodes [episodes] of a stored policy in its environment, from starts drawn with `seed`.
+
+    Another number of episodes is another compiled program: the last bits of a return may differ.
+    """
+    environment = envs.make(policy.header["environment"])
+    discount = policy.header["run"]["discount"]
+
+    def episode(key: jax.Array) -> EpisodeReturns:
+        return episode_returns(
+            environment, lambda observation: (policy.mean_action(observation, jnp), policy.log_std), key, discount
+        )
+
+    return jax.device_get(jax.jit(jax.vmap(episode))(jax.random.split(jax.random.key(seed), episodes)))

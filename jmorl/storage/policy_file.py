@@ -1,0 +1,99 @@
+"""A policy as one file: a NumPy archive with a JSON header, read without pickle and without JAX.
+
+The header names the environment, objectives, scores and origin; the arrays are the actor's layers and the
+observation statistics. `load_policy(path)(observation)` is the deterministic action.
+"""
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from envs.core import Environment
+from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
+from jmorl.search.policy import Policy
+from jmorl.storage.files import written_whole
+
+FORMAT = 1
+
+
+class PolicyFileError(ValueError):
+    """A file that is no policy, or one of a newer format."""
+
+
+@dataclass(frozen=True)
+class StoredPolicy:
+    """A policy read from a file. Call it with observations [..., O] for actions [..., A]."""
+
+    header: dict[str, Any]
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...]  # kernel [in, out] and bias [out] of each
+    log_std: np.ndarray  # [A]
+    observation_mean: np.ndarray  # [O]
+    observation_variance: np.ndarray  # [O]
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """The deterministic action, clipped to the environment's limits."""
+        low, high = self.header["action_limits"]
+        return np.clip(self.mean_action(np.asarray(observation, np.float32)), low, high)
+
+    def mean_action(self, observation: Any, xp: Any = np) -> Any:
+        """The unclipped mean action; `xp` may be `jax.numpy` to trace it."""
+        x = (observation - self.observation_mean) / np.sqrt(self.observation_variance + VARIANCE_FLOOR)
+        x = xp.clip(x, -NORMALIZED_CLIP, NORMALIZED_CLIP)
+        for kernel, bias in self.layers[:-1]:
+            x = xp.tanh(x @ kernel + bias)
+        kernel, bias = self.layers[-1]
+        return x @ kernel + bias
+
+
+def save_policy(path: Path, policy: Policy, environment: Environment[Any], run: dict[str, Any]) -> None:
+    """Write a policy whose snapshot is a `Learner`. `run` is noted in the header as its provenance."""
+    parameters = policy.snapshot.parameters["actor"]["params"]
+    layers = [parameters["MLP_0"][f"Dense_{index}"] for index in range(len(parameters["MLP_0"]))]
+    header = {
+        "format": FORMAT,
+        "environment": environment.id,
+        "objectives": [vars(objective) for objective in environment.objectives],
+        "action_limits": [environment.action_low, environment.action_high],
+        "id": policy.id,
+        "generation": policy.generation,
+        "parent": policy.parent,
+        "weights": policy.weights.tolist(),
+        "values": policy.values.tolist(),
+        "spread": policy.spread.tolist(),
+        "discounted": policy.discounted.tolist(),
+        "run": run,
+    }
+    statistics = policy.snapshot.observation_statistics
+    arrays = {
+        "header": np.array(json.dumps(header)),
+        "log_std": parameters["log_std"],
+        "observation_mean": statistics.mean,
+        "observation_variance": statistics.variance,
+    }
+    for index, layer in enumerate(layers):
+        arrays |= {f"layer_{index}_kernel": layer["kernel"], f"layer_{index}_bias": layer["bias"]}
+    with written_whole(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def load_policy(path: Path | str) -> StoredPolicy:
+    """Read a policy. Raises PolicyFileError, naming the file, if it is not one that can be read."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        header = json.loads(str(arrays["header"]))
+        if header["format"] > FORMAT:
+            raise PolicyFileError(f"{path} has format {header['format']}, newer than {FORMAT}; use a newer jmorl")
+        count = sum(name.endswith("_kernel") for name in arrays)
+        layers = tuple((arrays[f"layer_{i}_kernel"], arrays[f"layer_{i}_bias"]) for i in range(count))
+        return StoredPolicy(
+            header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"]
+        )
+    except PolicyFileError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+        raise PolicyFileError(f"{path} is not a policy file: {error}") from error
