@@ -140,8 +140,8 @@ class Config(Section):
     evaluation: EvaluationConfig = EvaluationConfig()
     search: SearchConfig = SearchConfig()
     steps: Count = Field(2_500_000, description="budget of environment steps used for learning")
-    reference_point: tuple[Finite, ...] | None = Field(
-        None, description="of the reported hypervolume, raw units; default: a tenth of the range below the warm-up"
+    reference_point: tuple[Finite, ...] = Field(
+        (), description="of the reported hypervolume, raw units; empty: a tenth of the range below the warm-up"
     )
 
     @field_validator("env")
@@ -169,8 +169,8 @@ class Config(Section):
 
     @field_validator("reference_point")
     @classmethod
-    def _one_per_objective(cls, point: tuple[float, ...] | None, info: ValidationInfo) -> tuple[float, ...] | None:
-        if point is not None and "env" in info.data:
+    def _one_per_objective(cls, point: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if point and "env" in info.data:
             objectives = len(envs.make(info.data["env"]).objectives)
             if len(point) != objectives:
                 raise ValueError(f"{len(point)} values for {objectives} objectives")
@@ -196,7 +196,7 @@ class Config(Section):
 
     def to_toml(self) -> str:
         """The config as a file that `resolve` reads back to the same config."""
-        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+        return tomli_w.dumps(self.model_dump(mode="json"))
 
 
 _PAPER_CAR = {

@@ -306,7 +306,7 @@ class _Run:
         return replace(state, buffer=state.buffer.offer(offspring, self._scale(state)))
 
     def _first_reference_point(self, warmed_up: tuple[Policy, ...]) -> np.ndarray:
-        if self.config.reference_point is not None:
+        if self.config.reference_point:
             return np.array(self.config.reference_point)
         return range_scale(values_of(warmed_up)).invert(np.array(-REFERENCE_MARGIN))
 

@@ -1,0 +1,165 @@
+"""Settings: every problem is named at once, every setting matters, and a config survives its own file."""
+
+import re
+from pathlib import Path
+
+import pytest
+from jmorl.config import Config, ConfigError, Section, resolve
+
+
+def fields(section, prefix=""):
+    """Every setting as (dotted name, default)."""
+    for name, field in section.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
+            yield from fields(field.annotation, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", field.default
+
+
+SETTINGS = dict(fields(Config))
+
+# A valid value other than the default for each setting; a new setting without one fails the test below.
+OTHER = {
+    "env": None,  # needs another registered environment; see the test
+    "method": "pgmorl",
+    "user": "B",
+    "seed": 2,
+    "population.agents": 4,
+    "population.warmup_iterations": 5,
+    "population.iterations": 5,
+    "ppo.environments": 8,
+    "ppo.rollout_steps": 2000,
+    "ppo.epochs": 5,
+    "ppo.minibatches": 16,
+    "ppo.learning_rate": 1e-3,
+    "ppo.adam_epsilon": 1e-8,
+    "ppo.discount": 0.99,
+    "ppo.gae_lambda": 0.9,
+    "ppo.clip": 0.1,
+    "ppo.value_coefficient": 1.0,
+    "ppo.entropy_coefficient": 0.01,
+    "ppo.max_gradient_norm": 1.0,
+    "ppo.initial_log_std": -0.5,
+    "ppo.hidden_sizes": (32,),
+    "ppo.weights_on": "scaled",
+    "evaluation.episodes": 8,
+    "search.delta": 0.2,
+    "search.bounds_scale": "one",
+    "search.gain_within": "front",
+    "search.value_scale": "none",
+    "search.sparsity_weight": 0.5,
+    "search.weight_divisions": 5,
+    "search.buffer_bins": 50,
+    "search.buffer_size": 2,
+    "steps": 5_000_000,
+    "reference_point": (-500.0, -500.0),
+}
+
+
+def nested(name, value):
+    for part in reversed(name.split(".")):
+        value = {part: value}
+    return value
+
+
+def test_every_setting_has_another_value_here():
+    assert set(SETTINGS) == set(OTHER)
+
+
+@pytest.mark.parametrize("name", [name for name, value in OTHER.items() if value is not None])
+def test_every_setting_changes_the_digest_and_survives_the_file(name, tmp_path):
+    changed = resolve().replace(**nested(name, OTHER[name]))
+    assert changed.digest() != resolve().digest()
+    file = tmp_path / "config.toml"
+    file.write_text(changed.to_toml())
+    assert resolve(file=file) == changed
+
+
+@pytest.mark.parametrize("name", [name for name in SETTINGS if name != "env"])
+def test_every_setting_is_used_outside_the_config(name):
+    """The authors' `gamma` never reached their agents."""
+    attribute = name.rpartition(".")[2]
+    sources = [path for path in Path("jmorl").rglob("*.py") if path.name != "config.py"]
+    used = re.compile(rf"(config|search|ppo|population|evaluation)\.{attribute}\b")
+    budget = {"steps": "iteration_budget"}
+    used = re.compile(budget[name]) if name in budget else used
+    assert any(used.search(path.read_text()) for path in sources)
+
+
+def test_all_problems_are_named_at_once():
+    overrides = {
+        "env": "mo-nowhere-v0",
+        "method": "magic",
+        "user": "Z",
+        "seed": "-1",
+        "population": {"agents": "0", "iterations": "2.5"},
+        "ppo": {"environments": "3", "rollout_steps": "7", "minibatches": "32", "discount": "1.5", "epochs": "many"},
+        "search": {"unheard_of": "1"},
+        "steps": "-5",
+    }
+    with pytest.raises(ConfigError) as error:
+        resolve("fancy", overrides=overrides)
+    problems = error.value.problems
+    for expected in (
+        "preset: unknown preset 'fancy'; known: default, paper",
+        "env: unknown environment 'mo-nowhere-v0'; known: mo-",
+        "method: ",
+        "user: unknown user 'Z'",
+        "seed: ",
+        "population.agents: ",
+        "population.iterations: ",
+        "ppo.minibatches: 32 minibatches do not divide a batch of E*T = 21 steps",
+        "ppo.discount: ",
+        "ppo.epochs: ",
+        "search.unheard_of: ",
+        "steps: ",
+    ):
+        assert [problem for problem in problems if problem.startswith(expected)], expected
+    assert len(problems) == 12
+
+
+@pytest.mark.parametrize(
+    ("overrides", "problem"),
+    [
+        ({"user": "target=1,2,3"}, "user: target must have one number for each of 2 objectives, not 3"),
+        ({"user": "weights=1"}, "user: weights must have one number for each of 2 objectives, not 1"),
+        ({"reference_point": "1,2,3"}, "reference_point: 3 values for 2 objectives"),
+        ({"steps": "240000"}, "steps: 240000 steps end within the warm-up; a first generation starts at 264000"),
+        ({"ppo": {"learning_rate": "nan"}}, "ppo.learning_rate: "),
+        ({"ppo": {"hidden_sizes": "32,-1"}}, "ppo.hidden_sizes.1: "),
+    ],
+)
+def test_one_problem_one_sentence(overrides, problem):
+    with pytest.raises(ConfigError, match=re.escape(problem)) as error:
+        resolve(overrides=overrides)
+    assert len(error.value.problems) == 1
+
+
+def test_flags_override_the_file_and_the_file_the_preset(tmp_path):
+    file = tmp_path / "config.toml"
+    file.write_text('user = "B"\n[ppo]\nepochs = 3\nenvironments = 8\n')
+    config = resolve("paper", file, {"ppo": {"epochs": "4"}})
+    assert (config.user, config.ppo.epochs, config.ppo.environments) == ("B", 4, 8)
+    assert config.ppo.discount == resolve("paper").ppo.discount
+
+
+@pytest.mark.parametrize("content", ["not toml at all [", None])
+def test_a_config_file_that_cannot_be_read_is_named(tmp_path, content):
+    file = tmp_path / "config.toml"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(ConfigError, match=f"config: cannot read {re.escape(str(file))}"):
+        resolve(file=file)
+
+
+def test_the_paper_preset_has_the_papers_sizes():
+    config = resolve("paper")
+    assert (config.population.agents, config.ppo.environments, config.ppo.rollout_steps) == (6, 4, 1000)
+    assert (config.population.warmup_iterations, config.population.iterations) == (10, 10)
+    assert config.steps_per_iteration * config.population.iterations == 240_000
+    assert config.iteration_budget == 104  # so 2.5 M steps end after 2.64 M
+
+
+def test_a_config_cannot_be_changed_in_place():
+    with pytest.raises(ValueError, match="frozen"):
+        Config().seed = 3
