@@ -54,7 +54,7 @@ def _split(section: type[Section], name: str, value: Any) -> Any:
     if field is None or not isinstance(value, str):
         return value
     kinds = (field.annotation, *get_args(field.annotation))
-    return value.split(",") if any(get_origin(kind) is tuple for kind in kinds) else value
+    return (value.split(",") if value else []) if any(get_origin(kind) is tuple for kind in kinds) else value
 
 
 class PopulationConfig(Section):

@@ -171,10 +171,12 @@ class _Run:
             finished = self.generation(state)
             yield finished
             state = finished.state
-        decided = self.ask(state, "final", _within(state.archive.members, state.bounds))
+        satisfied = self._satisfied(state)
+        # What satisfies may lie outside the bounds: the search is not the only one that finds things.
+        front = state.archive.members if satisfied else _within(state.archive.members, state.bounds)
+        decided = self.ask(state, "final", front)
         yield decided
-        reason: Literal["budget", "satisfied"] = "satisfied" if self._satisfied(state) else "budget"
-        yield RunFinished(_asked(state, decided), decided.chosen, reason)
+        yield RunFinished(_asked(state, decided), decided.chosen, "satisfied" if satisfied else "budget")
 
     def warm_up(self) -> GenerationFinished:
         """Generation 0: P new agents, with weights evenly spread."""

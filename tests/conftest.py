@@ -2,11 +2,31 @@
 
 import hypothesis
 import jax
+import pytest
 
+import envs
+from jmorl.config import Config
 from jmorl.learning.devices import use_all_cpu_cores
+from tests.probes import ThreeWays
 
 use_all_cpu_cores()
 jax.config.update("jax_num_cpu_devices", 2)
+envs.register(ThreeWays.id, ThreeWays)
+
 # Examples are the same in every run, and a slow machine is no failure.
 hypothesis.settings.register_profile("jmorl", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("jmorl")
+
+
+@pytest.fixture(scope="session")
+def small_config():
+    """A run of seconds with three objectives: a warm-up and three generations."""
+    return Config(
+        env=ThreeWays.id,
+        user="weights=0.5,0.3,0.2",
+        population={"agents": 4, "warmup_iterations": 2, "iterations": 3},
+        ppo={"environments": 3, "rollout_steps": 16, "minibatches": 4, "epochs": 2},
+        evaluation={"episodes": 2},
+        search={"weight_divisions": 4},
+        steps=4 * 3 * 16 * 11,
+    )

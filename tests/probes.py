@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
+
 from envs.core import Environment, Objective, Transition
 
 

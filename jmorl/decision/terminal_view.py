@@ -110,7 +110,7 @@ def show_plot(
 def _table(*headings: str) -> Table:
     table = Table(header_style="bold")
     for heading in headings:
-        table.add_column(Text(heading), justify="right")
+        table.add_column(Text(heading), justify="right", overflow="fold")
     return table
 
 

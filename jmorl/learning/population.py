@@ -28,6 +28,7 @@ class Population:
     """
 
     def __init__(self, environment: Environment[Any], config: Config):
+        _check_shapes(environment)
         self.size = config.population.agents
         self.moppo = MOPPO(environment, config.ppo)
         self.devices = jax.devices()[: device_count(self.size, jax.device_count())]
@@ -67,8 +68,15 @@ class Population:
         return learners, diagnostics
 
     def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        """Returns [P, episodes, M] of every learner from the same start keys [episodes]."""
-        return jax.device_get(self._evaluate(learners, keys))
+        """Returns [P, episodes, M] of every learner from the same start keys [episodes].
+
+        Raises TrainingFault, naming the agents, if a return is not finite.
+        """
+        returns = jax.device_get(self._evaluate(learners, keys))
+        faulty = np.flatnonzero(~np.isfinite(returns.undiscounted).all((1, 2)))
+        if len(faulty):
+            raise TrainingFault("; ".join(f"agent {agent}: a return is not finite in evaluation" for agent in faulty))
+        return returns
 
 
 def device_count(agents: int, available: int) -> int:
@@ -88,6 +96,22 @@ def _sharded(function: Callable[..., Any], mesh: Mesh) -> Any:
         )
 
     return jax.jit(population)
+
+
+def _check_shapes(environment: Environment[Any]) -> None:
+    """Raise ValueError, naming everything whose shape is not what the environment declares."""
+    key = jax.eval_shape(lambda: jax.random.key(0))
+    state, observation = jax.eval_shape(environment.reset, key)
+    action = jax.ShapeDtypeStruct((environment.action_size,), np.float32)
+    result = jax.eval_shape(environment.transition, state.physics, action)
+    declared = {
+        "observation": (observation.shape, (environment.observation_size,)),
+        "reward": (result.reward.shape, (len(environment.objectives),)),
+        "terminated": (result.terminated.shape, ()),
+    }
+    wrong = [f"{name} has shape {real}, not {shape}" for name, (real, shape) in declared.items() if real != shape]
+    if wrong:
+        raise ValueError(f"environment {environment.id} is not as it declares: {'; '.join(wrong)}")
 
 
 def _raise_faults(diagnostics: Diagnostics) -> None:

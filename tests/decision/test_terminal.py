@@ -28,6 +28,7 @@ class Session:
 
     def read(self, prompt: str) -> str:
         self.prompts.append(prompt)
+        assert len(self.prompts) < 10, "asked again and again"
         if not self.remaining:
             raise EOFError
         return self.remaining.pop(0)
@@ -205,6 +206,12 @@ def test_other_numbers_of_objectives_have_a_table_and_no_plot(ask):
         session = Session("11")
         assert session.user.answer(ask(values)) == Answer(11)
         assert "o: a policy" not in session.output
+
+
+def test_nothing_is_cut_off_in_a_narrow_terminal(ask):
+    session = Session("10", width=40)
+    session.user.answer(ask([[1.25, 2.5, 3.75], [3.5, 2.25, 1.5]]))
+    assert "…" not in session.output
 
 
 @pytest.mark.parametrize("values", [[[5, 5]], [[5, 5], [5, 5]], [[0, 0]], [[1e-9, 1e12], [2e-9, 1e12]]])

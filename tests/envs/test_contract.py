@@ -1,10 +1,11 @@
 """What every registered environment promises."""
 
-import envs
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+
+import envs
 
 STEPS = 60
 

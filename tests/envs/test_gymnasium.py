@@ -1,14 +1,15 @@
 """The adapter: Gymnasium's own checker, and the same episode as without it."""
 
-import envs
 import gymnasium
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from envs.gymnasium import GymnasiumEnvironment
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
+
+import envs
+from envs.gymnasium import GymnasiumEnvironment
 
 
 class Scalarized(gymnasium.RewardWrapper):

@@ -1,6 +1,5 @@
 """The mountain car against MO-Gymnasium's, one step from each of many states, walls and goal edge included."""
 
-import envs
 import gymnasium
 import jax
 import jax.numpy as jnp
@@ -8,6 +7,8 @@ import mo_gymnasium
 import numpy as np
 import pytest
 import scipy.stats
+
+import envs
 from envs.mountain_car import GOAL_POSITION, LEFT_WALL, MAX_SPEED, RIGHT_WALL, CarState
 
 ID = "mo-mountaincarcontinuous-v0"

@@ -4,12 +4,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+
 from jmorl.config import PPOConfig
 from jmorl.learning.losses import normalize_advantages
 from jmorl.learning.moppo import MOPPO, _random_order
 from jmorl.learning.returns import discounted_sums
 from jmorl.learning.statistics import normalize, return_scale
-
 from tests.probes import Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
 
 QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rate": 3e-3, "discount": 0.9}

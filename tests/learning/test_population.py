@@ -3,10 +3,10 @@
 import jax
 import numpy as np
 import pytest
+
 from jmorl.config import Config
 from jmorl.learning.moppo import MOPPO
 from jmorl.learning.population import Population, TrainingFault, device_count
-
 from tests.probes import Faulty, ThreeWays
 
 CONFIG = Config(

@@ -5,12 +5,12 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
+
 from jmorl.config import PPOConfig
 from jmorl.learning.losses import normalize_advantages
 from jmorl.learning.moppo import MOPPO, Batch
 from jmorl.learning.networks import gaussian_log_probability
 from jmorl.learning.returns import generalized_advantages
-
 from tests.probes import ThreeWays
 
 REFERENCE = dict(np.load(Path(__file__).parent / "fixtures" / "ppo_reference.npz"))
@@ -51,9 +51,7 @@ def parameters(group):
 def batch():
     b = {name.removeprefix("batch/"): array for name, array in REFERENCE.items() if name.startswith("batch/")}
     scalar = b["advantages"] @ b["weights"]
-    return Batch(
-        b["observations"], b["actions"], b["old_log_probabilities"], b["old_values"], scalar, b["returns"]
-    )
+    return Batch(b["observations"], b["actions"], b["old_log_probabilities"], b["old_values"], scalar, b["returns"])
 
 
 def assert_trees_close(left, right, **tolerance):

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+
 from jmorl.learning.statistics import NORMALIZED_CLIP, initial_statistics, normalize, update_statistics
 
 

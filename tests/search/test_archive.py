@@ -12,9 +12,11 @@ from jmorl.search.archive import Archive
 from jmorl.search.policy import Policy
 from tests.search.policies import policies, policy
 
-offers = st.integers(2, 4).flatmap(
-    lambda m: arrays(float, st.tuples(st.integers(1, 12), st.just(m)), elements=st.integers(-2, 4).map(float))
-).map(policies)
+offers = (
+    st.integers(2, 4)
+    .flatmap(lambda m: arrays(float, st.tuples(st.integers(1, 12), st.just(m)), elements=st.integers(-2, 4).map(float)))
+    .map(policies)
+)
 
 
 def as_set(archive: Archive) -> set[tuple[float, ...]]:

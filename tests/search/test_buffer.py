@@ -12,9 +12,11 @@ from jmorl.search.scaling import Scale
 from jmorl.search.weights import simplex_grid
 from tests.search.policies import policies, policy
 
-offers = st.integers(2, 4).flatmap(
-    lambda m: arrays(float, st.tuples(st.integers(1, 20), st.just(m)), elements=st.floats(-2, 4))
-).map(policies)
+offers = (
+    st.integers(2, 4)
+    .flatmap(lambda m: arrays(float, st.tuples(st.integers(1, 20), st.just(m)), elements=st.floats(-2, 4)))
+    .map(policies)
+)
 
 
 def unit_scale(objectives: int) -> Scale:

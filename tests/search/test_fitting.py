@@ -45,7 +45,7 @@ def neighbourhood_problems(count: int, seed: int) -> tuple[np.ndarray, np.ndarra
     x = generator.choice(X, size=shape)
     response = 0.1 * np.tanh(generator.uniform(0.5, 6.0, size=count) * (x - generator.uniform(0, 1, size=count)))
     y = response + 0.02 * generator.normal(size=shape)
-    importance = np.exp(-generator.uniform(0.0, 3.0, size=shape) ** 2 / 2)
+    importance = np.exp(-(generator.uniform(0.0, 3.0, size=shape) ** 2) / 2)
     importance[generator.integers(4, 13, size=count) <= np.arange(12)[:, None]] = 0.0
     return x, y, importance
 
@@ -65,12 +65,10 @@ def test_equals_scipy_where_the_optimum_is_plain() -> None:
 
 
 def test_as_good_as_scipy_on_what_a_search_asks_for() -> None:
-    x, y, importance = neighbourhood_problems(80, seed=2)
+    x, y, importance = neighbourhood_problems(60, seed=2)
     cost = fit_cost(fit_tanh(x, y, importance), x, y, importance)
     present = importance > 0
-    theirs = np.array(
-        [scipy_fit(x[here, f], y[here, f], importance[here, f])[1] for f, here in enumerate(present.T)]
-    )
+    theirs = np.array([scipy_fit(x[here, f], y[here, f], importance[here, f])[1] for f, here in enumerate(present.T)])
     assert (cost <= theirs * (1 + 1e-3) + 1e-9).mean() >= 0.95
 
 
@@ -82,7 +80,7 @@ def test_cost_is_scipys() -> None:
         np.testing.assert_allclose(ours, cost, rtol=1e-9)
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.05, 5.0])
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
 def test_no_small_move_within_the_box_is_better(noise: float) -> None:
     _, x, y, importance = planted_problems(40, records=9, noise=noise, seed=4)
     parameters = fit_tanh(x, y, importance)
@@ -91,10 +89,10 @@ def test_no_small_move_within_the_box_is_better(noise: float) -> None:
     lower, upper = np.array([low for low, _ in boxes]).T, np.array([high for _, high in boxes]).T
     assert (parameters >= lower).all() and (parameters <= upper).all()
     directions = np.concatenate([np.eye(4), -np.eye(4)])[:, :, None] * (upper - lower)
-    for step in (1e-2, 1e-4, 1e-6):
+    for step in (1e-4, 1e-6):
         for direction in directions:
             moved = fit_cost(np.clip(parameters + step * direction, lower, upper), x, y, importance)
-            assert np.mean(moved >= cost * (1 - 1e-3) - 1e-12) >= 0.97
+            assert (moved >= cost * (1 - 1e-3) - 1e-12).all()
 
 
 def test_a_fit_does_not_depend_on_its_company() -> None:

@@ -1,0 +1,110 @@
+"""A front in text: as a table, and as a scatter plot."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import plotille
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from envs.core import Objective
+from jmorl.report.text import number_format
+from jmorl.search.bounds import within
+from jmorl.search.policy import Policy, values_of
+
+AXIS_COLUMNS = 18  # that plotille adds to the width of a plot, besides the label of the axis
+AXIS_LINES = 4  # and to its height
+EMPTY_CELL = "\u2800"  # plotille's blank, a character that not every terminal can show
+
+
+def front_table(
+    policies: Sequence[Policy],
+    objectives: tuple[Objective, ...],
+    chosen_id: int | None = None,
+    previous_id: int | None = None,
+    by: int = 0,
+    bounds: np.ndarray | None = None,
+) -> Table:
+    """One row for each of at least one policy, the most of objective `by` first.
+
+    Values are in raw units, with their standard deviation over the evaluation episodes; weights are those the
+    policy was trained with, and gen the generation it was born in, 0 being the warm-up. What lies outside the
+    bounds [M] is dimmed.
+    """
+    values = values_of(list(policies))
+    spreads = np.stack([policy.spread for policy in policies])
+    inside = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
+    scores = [_scores(*column) for column in zip(values.T, spreads.T, strict=True)]
+    table = plain_table("policy", *map(stacked_label, objectives), "weights", "gen", "")
+    for index in np.argsort(-values[:, by], kind="stable"):
+        policy = policies[index]
+        notes = {policy.id == previous_id: "last choice", policy.id == chosen_id: "chosen"}
+        table.add_row(
+            str(policy.id),
+            *(column[index] for column in scores),
+            " ".join(f"{weight:.2g}" for weight in policy.weights),
+            str(policy.generation),
+            notes.get(True, "" if inside[index] else "outside the bounds"),
+            style="bold" if policy.id == chosen_id else None if inside[index] else "dim",
+        )
+    return table
+
+
+def front_scatter(
+    objectives: tuple[Objective, ...],
+    values: np.ndarray,  # [N, M] N >= 1
+    marks: Mapping[str, np.ndarray],  # character: point [M]
+    width: int,
+    height: int,
+) -> Text:
+    """The vectors as o and the marks as their characters, in plain text; for two objectives.
+
+    `width` and `height` are in characters, the axes included.
+    """
+    figure = plotille.Figure()
+    figure.width = max(width - AXIS_COLUMNS - len(objectives[0].label), 1)
+    figure.height = max(height - AXIS_LINES, 1)
+    figure.with_colors = False
+    figure.origin = False
+    figure.x_label, figure.y_label = (objective.label for objective in objectives)
+    figure.x_ticks_fkt, figure.y_ticks_fkt = (_tick_format(column) for column in values.T)
+    figure.scatter(values[:, 0], values[:, 1], marker="o")
+    for character, point in marks.items():
+        figure.text([point[0]], [point[1]], [character])
+    return Text(figure.show().replace(EMPTY_CELL, " "), no_wrap=True)
+
+
+def plain_table(*headings: str, title: str | None = None) -> Table:
+    """A table without vertical lines, as narrow as its content; only columns of notes, without heading, start left."""
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    for heading in headings:
+        table.add_column(Text(heading, overflow="fold"), justify="right" if heading else "left", header_style="")
+    return table
+
+
+def stacked_label(objective: Objective) -> str:
+    """The quantity above its unit, for the head of a column."""
+    return f"{objective.label}\n({objective.unit})"
+
+
+def _scores(values: np.ndarray, spreads: np.ndarray) -> list[str]:
+    """`-66.1  ±0.4` for each of the values [N], the values under each other."""
+    fmt = number_format(values)
+    texts = [f"±{spread:{fmt}}" for spread in spreads]
+    width = max(map(len, texts))
+    return [f"{value:{fmt}} {text:>{width}}" for value, text in zip(values, texts, strict=True)]
+
+
+def _tick_format(values: np.ndarray) -> Callable[[float, float], str]:
+    """How plotille shall write a tick: by the lower end of its interval."""
+    fmt = number_format(values)
+    return lambda low, _: f"{low:{fmt}}"

@@ -1,0 +1,150 @@
+"""A run on a terminal, redrawn while it computes."""
+
+import time
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.panel import Panel
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from envs.core import Objective
+from jmorl.config import Config
+from jmorl.report.fronts import front_scatter, front_table
+from jmorl.report.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.report.timeline import Timeline
+from jmorl.report.watchers import Watcher, show_result
+from jmorl.run import Event, RunFinished
+from jmorl.search.policy import values_of
+
+REFRESH_RATE = 4  # per second; a frame takes a few milliseconds
+WIDTH = 100  # columns of the panel at most
+FACT_LINES = 12  # of the screen that are not for the front
+PLOT_LINES = 18  # of the front at most
+LEAST_LINES = 9  # less is no plot
+
+
+class LiveView(Watcher):
+    """A panel that a thread redraws, so that times tick while the run is inside a compiled call.
+
+    `clock` gives seconds, as `time.monotonic` does.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        objectives: tuple[Objective, ...],
+        console: Console,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.config = config
+        self.objectives = objectives
+        self.console = console
+        self.clock = clock
+        self.timeline = Timeline(config, since=clock())  # replaced as a whole: the drawing thread reads it
+        self._live = Live(get_renderable=self.panel, console=console, refresh_per_second=REFRESH_RATE)
+
+    def __enter__(self) -> Self:
+        self._live.start(refresh=True)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+    def show(self, event: Event) -> None:
+        self.timeline = self.timeline.after(event, self.clock())
+        if isinstance(event, RunFinished):
+            self._live.stop()  # the panel stays as it is, above the result
+            show_result(self.console, event, self.objectives)
+
+    def panel(self) -> Panel:
+        """The picture of this moment."""
+        timeline, now = self.timeline, self.clock()
+        parts: list[RenderableType] = [self._bar(timeline, now), self._facts(timeline, now)]
+        if timeline.finished and (len(self.objectives) == 2 or not timeline.result):
+            parts += ["", self._front(timeline)]  # at the end of a run the table of the result is there anyway
+        config = self.config
+        title = f"{config.method} · {config.env} · user {config.user} · seed {config.seed}"
+        return Panel(Group(*parts), title=Text(title), title_align="left", width=min(self.console.width, WIDTH))
+
+    def _bar(self, timeline: Timeline, now: float) -> Table:
+        """What is going on, and how much of the budget is used."""
+        row = Table.grid(expand=True, padding=(0, 2, 0, 0))
+        row.add_column(no_wrap=True)
+        row.add_column(ratio=1)
+        row.add_column(no_wrap=True)
+        steps, total = timeline.steps(now), timeline.total_steps
+        unknown = timeline.finished is None
+        bar = ProgressBar(total, steps, pulse=unknown, animation_time=now)
+        row.add_row(Text(_phase(timeline), "bold"), bar, f"{short_count(steps)} of {short_count(total)} steps")
+        return row
+
+    def _facts(self, timeline: Timeline, now: float) -> Table:
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(no_wrap=True, style="dim")
+        for name, text in self._named_facts(timeline, now):
+            grid.add_row(name, Text(text))
+        return grid
+
+    def _named_facts(self, timeline: Timeline, now: float) -> Iterator[tuple[str, str]]:
+        if timeline.result:
+            yield "reason", REASONS[timeline.result.reason]
+        elif timeline.finished is None:
+            yield "time", duration(now - timeline.since)
+        else:
+            yield from _remaining(timeline, now)
+        if timeline.finished:
+            front, utility = timeline.finished.front, timeline.finished.utility
+            yield "speed", f"{short_count(timeline.finished.steps_per_second)} steps/s"
+            yield "front", f"{plural(front.front_size, 'policy')}, hypervolume {number(front.hypervolume)}"
+            if utility.utility_max is not None and utility.utility_mean is not None:
+                yield "utility", f"best {number(utility.utility_max)}, mean {number(utility.utility_mean)}"
+        if timeline.decided:
+            decided = timeline.decided
+            formats = [number_format(column) for column in decided.question.values.T]
+            values = values_in_words(decided.chosen.values, self.objectives, formats)
+            yield "chosen" if timeline.result else "last choice", f"policy {decided.chosen.id}: {values}"
+            if np.isfinite(decided.bounds).any():
+                yield "bounds", values_in_words(decided.bounds, self.objectives, formats, "≥ ")
+
+    def _front(self, timeline: Timeline) -> RenderableType:
+        """The front as a plot of two objectives, or as the first lines of a table of more."""
+        assert timeline.finished is not None
+        members = timeline.finished.state.archive.members
+        lines = min(self.console.height - FACT_LINES, PLOT_LINES)
+        chosen = timeline.decided.chosen if timeline.decided else None
+        if lines < LEAST_LINES:
+            return ""
+        if len(self.objectives) == 2:
+            marks = {"x": chosen.values} if chosen else {}
+            plot = front_scatter(self.objectives, values_of(members), marks, min(self.console.width, WIDTH) - 4, lines)
+            return plot
+        return front_table(members, self.objectives, previous_id=chosen.id if chosen else None)
+
+
+def _phase(timeline: Timeline) -> str:
+    match timeline.phase:
+        case "generation":
+            return f"generation {timeline.generation} of {timeline.generations}"
+        case "question" if timeline.generation > timeline.generations:
+            return "final choice"
+        case "question":
+            return f"choice for generation {timeline.generation}"
+    return timeline.phase
+
+
+def _remaining(timeline: Timeline, now: float) -> Iterator[tuple[str, str]]:
+    question, end = timeline.seconds_to_question(now), timeline.seconds_to_end(now)
+    if timeline.phase == "question":
+        yield "next question", f"waiting for an answer since {duration(now - timeline.since)}"
+    elif question is not None:
+        yield "next question", f"in {duration(question)}" if question else "any moment"
+    if end is not None:
+        yield "end", f"in about {duration(end)}" if end else "any moment"

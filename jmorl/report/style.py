@@ -1,0 +1,111 @@
+"""How every plot looks: fonts, colours, sizes, and the way to a file. No global state, and no window."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from envs.core import Objective
+from jmorl.report.text import objective_label
+from jmorl.storage.files import written_whole
+
+DOTS_PER_INCH = 150
+# Okabe and Ito's colours, which colour-blind people can tell apart.
+BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+INK, GREY, PALE = "#222222", "#767676", "#b8b8b8"
+SETTINGS: dict[Any, Any] = {
+    "figure.dpi": DOTS_PER_INCH,
+    "savefig.dpi": DOTS_PER_INCH,
+    "figure.facecolor": "white",
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "text.usetex": False,
+    "text.parse_math": False,
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10,
+    "axes.edgecolor": GREY,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#ececec",
+    "xtick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.color": GREY,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "lines.linewidth": 1.6,
+}
+
+Colour = tuple[float, float, float, float]
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Draw in the project's style within this block; whatever was set before is back after it."""
+    with matplotlib.rc_context(SETTINGS):
+        yield
+
+
+def new_figure(width: float, height: float, title: str) -> Figure:
+    """An empty figure, in inches, whose layout keeps everything apart."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write the figure as a PNG file."""
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, format="png")
+    return path
+
+
+def generation_colour(generation: int, last: int) -> Colour:
+    """From early, bright, to late, dark, for the generations 0 to `last`; safe for colour-blind people."""
+    red, green, blue, alpha = _generations(last).to_rgba(np.array([generation]))[0]
+    return float(red), float(green), float(blue), float(alpha)
+
+
+def generation_bar(figure: Figure, axes: Sequence[Axes], last: int) -> None:
+    """The key of `generation_colour`, beside the axes; nothing with just the warm-up."""
+    if last:
+        ticks = MaxNLocator(6, integer=True)
+        bar = figure.colorbar(_generations(last), ax=list(axes), shrink=0.7, aspect=30, pad=0.015, ticks=ticks)
+        bar.set_label("generation (0: warm-up)")
+        bar.outline.set_visible(False)
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist], columns: int) -> None:
+    """The legend of all axes, below them."""
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+
+
+def label_axes(axes: Axes, x: Objective, y: Objective) -> None:
+    """Quantity and unit at both axes."""
+    axes.set_xlabel(objective_label(x))
+    axes.set_ylabel(objective_label(y))
+
+
+def note(axes: Axes, text: str) -> None:
+    """A small remark above the axes, at their right end."""
+    axes.set_title(text, loc="right", fontsize=8, color=GREY)
+
+
+def _generations(last: int) -> ScalarMappable:
+    viridis = matplotlib.colormaps["viridis_r"]
+    without_yellow = ListedColormap(viridis(np.linspace(0.12, 1.0, 256)))  # hard to see on white
+    return ScalarMappable(Normalize(0, max(last, 1)), without_yellow)

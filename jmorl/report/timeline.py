@@ -1,0 +1,98 @@
+"""Where a run stands between two of its events, and how long it still takes."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from jmorl.config import Config
+from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished
+
+Phase = Literal["compiling", "warm-up", "generation", "question", "finished"]
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """What has happened, what is going on, and since when. Times are seconds of any one clock."""
+
+    config: Config
+    since: float  # when the phase began
+    phase: Phase = "compiling"
+    generation: int = 0  # that is going on, or that a question is about
+    silent: int = 0  # generations before the next question, the one that is going on included
+    compiled: Compiled | None = None
+    decided: Decided | None = None  # the last answer
+    finished: GenerationFinished | None = None  # the last generation
+    result: RunFinished | None = None
+
+    @property
+    def generations(self) -> int:
+        """How many generations the budget is good for, the warm-up not counted; a run may end earlier."""
+        population = self.config.population
+        return -((population.warmup_iterations - self.config.iteration_budget) // population.iterations)
+
+    @property
+    def generation_steps(self) -> int:
+        """Environment steps of one generation."""
+        return self.config.population.iterations * self.config.steps_per_iteration
+
+    @property
+    def total_steps(self) -> int:
+        """Environment steps of a run that does not end early; the budget, rounded up to a generation."""
+        warmup = self.config.population.warmup_iterations * self.config.steps_per_iteration
+        return warmup + self.generations * self.generation_steps
+
+    def after(self, event: Event, now: float) -> "Timeline":
+        """The timeline when `event` has just happened."""
+        match event:
+            case Compiled():
+                return replace(self, phase="warm-up", since=now, compiled=event)
+            case GenerationFinished():
+                return replace(self._next(event), since=now, finished=event)
+            case Decided():
+                goes_on = event.question.purpose == "steer" and not event.answer.stop
+                phase: Phase = "generation" if goes_on else "question"
+                return replace(self, phase=phase, since=now, silent=event.answer.generations, decided=event)
+            case RunFinished():
+                return replace(self, phase="finished", since=now, result=event)
+
+    def generation_seconds(self) -> float | None:
+        """How long a generation takes, judged by the last one; None before the first."""
+        if self.finished is None:
+            return None
+        seconds, population = self.finished.seconds, self.config.population
+        if self.finished.state.generation:
+            return seconds.total
+        return seconds.train * population.iterations / population.warmup_iterations + seconds.evaluate
+
+    def steps(self, now: float) -> int:
+        """Environment steps so far; within a generation as many as it should have made by now."""
+        if self.finished is None:
+            return 0
+        expected = self.generation_seconds()
+        share = min((now - self.since) / expected, 1.0) if self.phase == "generation" and expected else 0.0
+        return self.finished.steps + int(share * self.generation_steps)
+
+    def seconds_to_question(self, now: float) -> float | None:
+        """How long until the decision maker is asked; None if that is not known or not to come."""
+        if self.phase != "generation" or self.config.method != "interactive":
+            return None
+        return self._seconds(now, min(self.silent - 1, self.generations - self.generation))
+
+    def seconds_to_end(self, now: float) -> float | None:
+        """How long until the end, the time for answers not counted; None if that is not known."""
+        left = self.generations - self.generation
+        return self._seconds(now, left if self.phase == "generation" else left + 1)
+
+    def _seconds(self, now: float, generations: int) -> float | None:
+        """What is left of the generation that is going on, and so many more."""
+        each = self.generation_seconds()
+        if each is None:
+            return None
+        running = max(each - (now - self.since), 0.0) if self.phase == "generation" else 0.0
+        return running + generations * each
+
+    def _next(self, event: GenerationFinished) -> "Timeline":
+        """What follows on a generation."""
+        generation, silent = event.state.generation + 1, event.state.silent_generations
+        asks = self.config.method == "interactive" and not silent
+        phase: Phase = "question" if asks or generation > self.generations else "generation"
+        return replace(self, phase=phase, generation=generation, silent=silent)

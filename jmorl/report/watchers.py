@@ -1,0 +1,204 @@
+"""Who watches a run without a screen of their own: in lines, in JSON, or not at all."""
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import asdict
+from types import TracebackType
+from typing import Any, Self, TextIO
+
+import numpy as np
+from rich.console import Console
+
+from envs.core import Objective
+from jmorl.config import Config
+from jmorl.report.fronts import front_table
+from jmorl.report.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.report.timeline import Timeline
+from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished
+from jmorl.search.policy import Policy
+
+
+class Watcher(ABC):
+    """Shows a run, event by event, within a `with` block."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        return None
+
+    @abstractmethod
+    def show(self, event: Event) -> None:
+        """Show what has just happened."""
+
+
+class Quiet(Watcher):
+    """Shows nothing."""
+
+    def show(self, event: Event) -> None:
+        pass
+
+
+class Lines(Watcher):
+    """One line for every event, and the final front as a table."""
+
+    def __init__(self, config: Config, objectives: tuple[Objective, ...], console: Console):
+        self.objectives = objectives
+        self.console = console
+        self.generations = Timeline(config, since=0.0).generations
+
+    def show(self, event: Event) -> None:
+        self.console.print(self._line(event), markup=False, highlight=False, soft_wrap=True)
+        if isinstance(event, RunFinished):
+            show_result(self.console, event, self.objectives)
+
+    def _line(self, event: Event) -> str:
+        match event:
+            case Compiled():
+                return f"compiled in {duration(event.seconds)} on {plural(event.devices, 'device')}"
+            case GenerationFinished():
+                return self._generation_line(event)
+            case Decided():
+                return f"{question_name(event)}: {choice_in_words(event, self.objectives)}"
+            case RunFinished():
+                return f"finished: {REASONS[event.reason]}; the result is policy {event.chosen.id}"
+
+    def _generation_line(self, event: GenerationFinished) -> str:
+        generation, seconds = event.state.generation, event.seconds
+        name = f"generation {generation} of {self.generations}" if generation else "warm-up"
+        facts = [
+            f"{short_count(event.steps)} steps",
+            f"{short_count(event.steps_per_second)} steps/s",
+            f"front of {event.front.front_size}",
+            f"hypervolume {number(event.front.hypervolume)}",
+        ]
+        if event.utility.utility_max is not None:
+            facts.append(f"best utility {number(event.utility.utility_max)}")
+        times = f"train {duration(seconds.train)}, evaluate {duration(seconds.evaluate)}"
+        if generation:
+            times = f"select {duration(seconds.select)}, {times}"
+        return f"{name}: {', '.join(facts)} ({times})"
+
+
+class Json(Watcher):
+    """One JSON object per line for every event, for other programs. Numbers that are not finite are null.
+
+    `event` says which one, and `values`, `spread`, `weights` and `bounds` have a number for each objective:
+
+        {"event": "compiled", "seconds", "devices"}
+        {"event": "generation", "generation": 0 is the warm-up, "generations": in the budget, "steps",
+         "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates", "bounds",
+         "front_size", "hypervolume", "expected_utility", "sparsity", "utility_max", "utility_mean",
+         "utility_mean_within_bounds", "prediction_error", "realized_change", "front": [policy, ...]}
+        {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
+         "bounds": that follow, "shown": how many policies, "stop", "generations": before the next question, "seconds"}
+        {"event": "finished", "reason": "budget", "satisfied" or "stopped", "chosen": policy}
+
+    A policy is {"policy": its id, "generation", "parent", "weights", "values", "spread"}.
+    """
+
+    def __init__(self, config: Config, file: TextIO):
+        self.file = file
+        self.generations = Timeline(config, since=0.0).generations
+
+    def show(self, event: Event) -> None:
+        self.file.write(json.dumps(_finite(self._fields(event)), allow_nan=False) + "\n")
+        self.file.flush()
+
+    def _fields(self, event: Event) -> dict[str, Any]:
+        match event:
+            case Compiled():
+                return {"event": "compiled", **asdict(event)}
+            case GenerationFinished():
+                return self._generation_fields(event)
+            case Decided():
+                return {
+                    "event": "decided",
+                    "purpose": event.question.purpose,
+                    "generation": event.question.generation,
+                    "policy": event.chosen.id,
+                    "values": event.chosen.values.tolist(),
+                    "bounds": event.bounds.tolist(),
+                    "shown": len(event.question.front),
+                    "stop": event.answer.stop,
+                    "generations": event.answer.generations,
+                    "seconds": event.seconds,
+                }
+            case RunFinished():
+                return {"event": "finished", "reason": event.reason, "chosen": _policy_fields(event.chosen)}
+
+    def _generation_fields(self, event: GenerationFinished) -> dict[str, Any]:
+        prediction = {"prediction_error": None, "realized_change": None}
+        return {
+            "event": "generation",
+            "generation": event.state.generation,
+            "generations": self.generations,
+            "steps": event.steps,
+            "evaluation_steps": event.state.evaluation_steps,
+            "steps_per_second": event.steps_per_second,
+            "seconds": asdict(event.seconds),
+            "candidates": event.candidates,
+            "bounds": event.state.bounds.tolist(),
+            **asdict(event.front),
+            **asdict(event.utility),
+            **(asdict(event.prediction) if event.prediction else prediction),
+            "front": [_policy_fields(policy) for policy in event.state.archive.members],
+        }
+
+
+def question_name(decided: Decided) -> str:
+    """What was asked."""
+    return (
+        "final choice"
+        if decided.question.purpose == "final"
+        else f"choice for generation {decided.question.generation}"
+    )
+
+
+def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
+    """`policy 12 (time -66.1, fuel -57.3) of 9 shown; bounds time ≥ -70.2, fuel ≥ -60.4`."""
+    formats = [number_format(column) for column in decided.question.values.T]
+    values = values_in_words(decided.chosen.values, objectives, formats)
+    choice = f"policy {decided.chosen.id} ({values}) of {len(decided.question.front)} shown"
+    if decided.answer.stop:
+        return f"{choice}, and stop"
+    if decided.question.purpose == "final":
+        return choice
+    bounds = values_in_words(decided.bounds, objectives, formats, "≥ ")
+    silent = decided.answer.generations
+    more = f", no question for {plural(silent, 'generation')}" if silent > 1 else ""
+    return f"{choice}; bounds {bounds}{more}"
+
+
+def show_result(console: Console, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
+    """The final front, with the chosen policy marked."""
+    table = front_table(event.state.archive.members, objectives, event.chosen.id)
+    table.title = "Final front"
+    console.print()
+    console.print(table)
+
+
+def _policy_fields(policy: Policy) -> dict[str, Any]:
+    return {
+        "policy": policy.id,
+        "generation": policy.generation,
+        "parent": policy.parent,
+        "weights": policy.weights.tolist(),
+        "values": policy.values.tolist(),
+        "spread": policy.spread.tolist(),
+    }
+
+
+def _finite(content: Any) -> Any:
+    """The same without infinity and NaN, which JSON does not know."""
+    match content:
+        case dict():
+            return {name: _finite(value) for name, value in content.items()}
+        case list():
+            return [_finite(value) for value in content]
+        case float() if not np.isfinite(content):
+            return None
+    return content
