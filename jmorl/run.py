@@ -141,6 +141,16 @@ def run(
     return _Run(config, environment, decision_maker).events()
 
 
+def evaluation_keys(config: Config) -> jax.Array:
+    """The start keys [episodes] from which a run evaluates every policy."""
+    return jax.random.split(_keys(config)[2], config.evaluation.episodes)
+
+
+def _keys(config: Config) -> jax.Array:
+    """For initialisation, training and evaluation, [3]."""
+    return jax.random.split(jax.random.key(config.seed), 3)
+
+
 class _Run:
     """What stays the same during a run, and the steps it is made of."""
 
@@ -150,8 +160,8 @@ class _Run:
         self.decision_maker = decision_maker
         self.population = Population(environment, config)
         self.candidate_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
-        self.initial_key, self.training_key, start_key = jax.random.split(jax.random.key(config.seed), 3)
-        self.start_keys = jax.random.split(start_key, config.evaluation.episodes)
+        self.initial_key, self.training_key, _ = _keys(config)
+        self.start_keys = evaluation_keys(config)
 
     def events(self) -> Iterator[Event]:
         yield Compiled(self.population.compile(self.start_keys), len(self.population.devices))
