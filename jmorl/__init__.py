@@ -1,0 +1,29 @@
+"""Interactive multi-objective reinforcement learning: a population trained in one JAX call, steered by a person.
+
+The names here are all that a program needs; see the README. Settings are in `jmorl.config`, events in `jmorl.run`.
+"""
+
+from jmorl.config import Config, ConfigError, resolve
+from jmorl.decision.protocol import Answer, DecisionMaker, Question
+from jmorl.learning.devices import use_all_cpu_cores
+from jmorl.learning.population import TrainingFault
+from jmorl.run import run
+from jmorl.storage.policy_file import load_policy, save_policy
+from jmorl.storage.run_folder import RunFolder
+from jmorl.storage.stored_run import read_run
+
+__all__ = [
+    "Answer",
+    "Config",
+    "ConfigError",
+    "DecisionMaker",
+    "Question",
+    "RunFolder",
+    "TrainingFault",
+    "load_policy",
+    "read_run",
+    "resolve",
+    "run",
+    "save_policy",
+    "use_all_cpu_cores",
+]

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from envs.core import Objective
 from jmorl.config import PRESETS, Config, ConfigError, Section, resolve
+from jmorl.decision.protocol import DecisionMaker
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
@@ -32,9 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.command(options)
     except ConfigError as error:
         return _failed(error.problems, EXIT_BAD_INPUT)
-    except (FolderInUse, PolicyFileError, ScriptError, StoredRunError) as error:
+    except (FolderInUse, PolicyFileError, StoredRunError) as error:
         return _failed([str(error)], EXIT_BAD_INPUT)
-    except TrainingFault as error:
+    except (TrainingFault, ScriptError, EOFError, OSError) as error:
         return _failed([f"the run stopped: {error}"], EXIT_FAILED)
     except KeyboardInterrupt:
         return _failed(["interrupted"], EXIT_INTERRUPTED)
@@ -59,16 +61,18 @@ def _train(options: argparse.Namespace) -> None:
 
     config = _checked_config(options)
     environment = envs.make(config.env)
+    decision_maker = _decision_maker(config.user, environment.objectives)
     folder = RunFolder.create(options.out, config, environment, options.force)
     console = Console()
-    kind = _display(options, config, console)
-    with watcher(kind, config, environment.objectives, console) as watch:
-        for event in run(config, environment=environment):
+    kind = "json" if options.json else "quiet" if options.quiet else "live" if console.is_terminal else "lines"
+    with watcher(kind, config, environment.objectives, console) as watching:
+        for event in run(config, decision_maker, environment):
             folder.record(event)
-            watch.show(event)
+            watching.show(event)
     draw_run(read_run(folder.path), folder.path / "plots")
-    if kind not in ("quiet", "json"):
-        console.print(f"Everything is in [bold]{folder.path}[/bold]; the policy you chose is chosen.npz there.")
+    if kind in ("live", "lines"):
+        where = f"Everything is in {folder.path}, the chosen policy in {folder.path / 'chosen.npz'}."
+        console.print(where, soft_wrap=True, highlight=False)
 
 
 def _checked_config(options: argparse.Namespace) -> Config:
@@ -91,10 +95,13 @@ def _checked_config(options: argparse.Namespace) -> Config:
     return config
 
 
-def _display(options: argparse.Namespace, config: Config, console: Any) -> str:
-    if options.json or options.quiet:
-        return "json" if options.json else "quiet"
-    return "live" if console.is_terminal and config.user != "terminal" else "lines"
+def _decision_maker(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
+    from jmorl.decision.users import make_user
+
+    try:
+        return make_user(spec, objectives)
+    except ValueError as error:
+        raise ConfigError([f"user: {error}"]) from error
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, Any]:
@@ -111,15 +118,17 @@ def _overrides(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _evaluate(options: argparse.Namespace) -> None:
+    import jax
     from rich.console import Console
 
-    from jmorl.report.tables import evaluation_table
+    from jmorl.report.listings import evaluation_table
     from jmorl.scoring import evaluate_stored
     from jmorl.storage.policy_file import load_policy
 
     path = options.policy / "chosen.npz" if options.policy.is_dir() else options.policy
     policy = load_policy(path)
-    returns = evaluate_stored(policy, options.episodes, options.seed)
+    keys = jax.random.split(jax.random.key(options.seed), options.episodes)
+    returns = evaluate_stored(policy, keys)
     if options.json:
         print(json.dumps({"policy": str(path), "seed": options.seed, "returns": returns.undiscounted.tolist()}))
     else:
@@ -129,16 +138,12 @@ def _evaluate(options: argparse.Namespace) -> None:
 def _enautilus(options: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from jmorl.decision.users import make_user
-    from jmorl.report.tables import front_table
+    from jmorl.report.fronts import front_table
     from jmorl.storage.afterwards import choose_afterwards
     from jmorl.storage.stored_run import read_run
 
     stored = read_run(options.run)
-    try:
-        user = make_user(options.user or stored.config.user, stored.objectives)
-    except ValueError as error:
-        raise ConfigError([f"user: {error}"]) from error
+    user = _decision_maker(options.user or stored.config.user, stored.objectives)
     chosen = choose_afterwards(stored, user, options.iterations, options.points)
     if options.json:
         print((options.run / "enautilus.json").read_text(), end="")
@@ -158,13 +163,13 @@ def _show(options: argparse.Namespace) -> None:
     for table in run_tables(stored):
         console.print(table)
     for plot in draw_run(stored, options.run / "plots"):
-        console.print(f"plot: {plot}")
+        console.print(f"plot: {plot}", soft_wrap=True, highlight=False)
 
 
 def _envs(options: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from jmorl.report.tables import environments_table
+    from jmorl.report.listings import environments_table
 
     Console().print(environments_table())
 

@@ -101,7 +101,7 @@ class PPOConfig(Section):
 class EvaluationConfig(Section):
     """How policies are scored: mean undiscounted return, deterministic actions, fixed starts."""
 
-    episodes: Count = Field(16, description="episodes of each evaluation")
+    episodes: Count = Field(64, description="episodes of each evaluation")
 
 
 class SearchConfig(Section):

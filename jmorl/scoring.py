@@ -31,17 +31,19 @@ def raw_scores(returns: EpisodeReturns) -> Scores:
     return Scores(undiscounted.mean(1), undiscounted.std(1), discounted.mean(1), int(returns.length.sum()))
 
 
-def evaluate_stored(policy: StoredPolicy, episodes: int, seed: int) -> EpisodeReturns:
-    """Deterministic episodes [episodes] of a stored policy in its environment, from starts drawn with `seed`.
+def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
+    """Deterministic episodes of a stored policy in its environment, one for each start key [episodes].
 
     Another number of episodes is another compiled program: the last bits of a return may differ.
     """
     environment = envs.make(policy.header["environment"])
     discount = policy.header["run"]["discount"]
 
-    def episode(key: jax.Array) -> EpisodeReturns:
-        return episode_returns(
-            environment, lambda observation: (policy.mean_action(observation, jnp), policy.log_std), key, discount
-        )
+    def act(observation: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return policy.mean_action(observation, jnp), jnp.asarray(policy.log_std)
 
-    return jax.device_get(jax.jit(jax.vmap(episode))(jax.random.split(jax.random.key(seed), episodes)))
+    def episode(key: jax.Array) -> EpisodeReturns:
+        return episode_returns(environment, act, key, discount)
+
+    returns: EpisodeReturns = jax.device_get(jax.jit(jax.vmap(episode))(keys))
+    return returns

@@ -49,9 +49,9 @@ def front_figure(run: StoredRun, title: str) -> Figure:
         _draw_bounds(axes, run.bounds[1:], limits)
         draw_policies(axes, run, [0, 1], limits)
     if len(views) > 1:
-        _frame_close_up(*grid, close)
+        _frame_close_up(grid[0], grid[1], close)
     generation_bar(figure, grid, last)
-    legend_below(figure, legend_of(run), columns=7 if len(views) > 1 else 4)
+    legend_below(figure, legend_of(run, "choice, with its generation"), columns=7 if len(views) > 1 else 4)
     figure.draw_without_rendering()  # settles the layout that labels are placed in
     for axes, limits, hidden in zip(grid, views, [*views[1:], None], strict=True):
         _label_choices(axes, run, limits, hidden)
@@ -114,8 +114,8 @@ def front_name(run: StoredRun) -> str:
     return "final front" if run.result else "front so far"
 
 
-def legend_of(run: StoredRun, without: Container[str] = ()) -> list[Artist]:
-    """An entry for each kind of thing there is in a run, but for those `without`."""
+def legend_of(run: StoredRun, choice: str, without: Container[str] = ()) -> list[Artist]:
+    """An entry for each kind of thing there is in a run, but for those `without`; a choice is called `choice`."""
     last = len(run.bounds) - 1
     early, late = generation_colour(0, last), generation_colour(last, last)
     entries: dict[str, Artist] = {"policy": Line2D([], [], marker="o", color=PALE, ms=4, ls="", label="policy")}
@@ -123,8 +123,7 @@ def legend_of(run: StoredRun, without: Container[str] = ()) -> list[Artist]:
         entries["earlier"] = Line2D([], [], color=early, linewidth=0.9, label="earlier front")
     entries["front"] = Line2D([], [], color=late, marker="o", markeredgecolor="white", label=front_name(run))
     if choices_of(run):
-        entries["choice"] = Line2D([], [], label="choice", **RING)
-        entries["number"] = Line2D([], [], marker="$3$", color=INK, linestyle="", label="for this generation")
+        entries["choice"] = Line2D([], [], label=choice, **RING)
         entries["bounds"] = Line2D([], [], label="bounds of a choice", **BOUNDS_LINE)
     if np.isfinite(run.bounds[-1]).all():
         entries["bounds area"] = Patch(label="within the last bounds", **BOUNDS_AREA)

@@ -9,12 +9,13 @@ from rich.table import Table
 from rich.text import Text
 
 from envs.core import Objective
-from jmorl.report.text import number_format
+from jmorl.report.limits import core
+from jmorl.report.text import number_format, plural
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy, values_of
 
-AXIS_COLUMNS = 18  # that plotille adds to the width of a plot, besides the label of the axis
-AXIS_LINES = 4  # and to its height
+AXIS_COLUMNS = 19  # that plotille adds to the width of a plot, besides the label of the axis
+AXIS_LINES = 5  # and to its height, with a line about what is left out
 EMPTY_CELL = "\u2800"  # plotille's blank, a character that not every terminal can show
 
 
@@ -60,19 +61,24 @@ def front_scatter(
 ) -> Text:
     """The vectors as o and the marks as their characters, in plain text; for two objectives.
 
-    `width` and `height` are in characters, the axes included.
+    What is far out is left out, with a word about it, unless it is marked. `width` and `height` are in characters,
+    all included.
     """
+    near = core(values)
+    shown = np.stack([*values[near], *marks.values()])
     figure = plotille.Figure()
     figure.width = max(width - AXIS_COLUMNS - len(objectives[0].label), 1)
     figure.height = max(height - AXIS_LINES, 1)
     figure.with_colors = False
     figure.origin = False
     figure.x_label, figure.y_label = (objective.label for objective in objectives)
-    figure.x_ticks_fkt, figure.y_ticks_fkt = (_tick_format(column) for column in values.T)
-    figure.scatter(values[:, 0], values[:, 1], marker="o")
+    figure.x_ticks_fkt, figure.y_ticks_fkt = (_tick_format(column) for column in shown.T)
+    figure.scatter(values[near, 0], values[near, 1], marker="o")
     for character, point in marks.items():
         figure.text([point[0]], [point[1]], [character])
-    return Text(figure.show().replace(EMPTY_CELL, " "), no_wrap=True)
+    plot = figure.show().replace(EMPTY_CELL, " ")
+    left_out = f"\n({plural(int((~near).sum()), 'policy')} far out)" if not near.all() else ""
+    return Text(plot + left_out, no_wrap=True)
 
 
 def plain_table(*headings: str, title: str | None = None) -> Table:

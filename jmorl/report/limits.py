@@ -29,7 +29,7 @@ def hopeful(values: np.ndarray) -> np.ndarray:
 def box(values: np.ndarray, margin: float = 0.06) -> np.ndarray:
     """The limits of axes around the vectors [N, M], with a share of their extent as margin: lows and highs [2, M]."""
     low, high = values.min(axis=0), values.max(axis=0)
-    extent = np.where(high > low, high - low, np.maximum(0.1 * np.abs(high), 1e-3))
+    extent = np.where(high > low, high - low, np.where(high == 0, 1.0, 0.1 * np.abs(high)))
     return np.stack([low - margin * extent, high + margin * extent])
 
 

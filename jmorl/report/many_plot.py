@@ -57,7 +57,7 @@ def pairs_figure(run: StoredRun, title: str) -> Figure:
                 draw_policies(axes, run, pair, limits[:, pair])
                 axes.label_outer()
     generation_bar(figure, list(grid.flat), len(run.bounds) - 1)
-    legend_below(figure, legend_of(run, without=("earlier", "number", "bounds")), columns=3)
+    legend_below(figure, legend_of(run, "choice", without=("earlier", "bounds")), columns=3)
     return figure
 
 

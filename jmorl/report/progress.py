@@ -1,7 +1,6 @@
 """Showing a run while it lasts."""
 
 import sys
-from typing import Literal
 
 from rich.console import Console
 
@@ -10,26 +9,21 @@ from jmorl.config import Config
 from jmorl.report.live import LiveView
 from jmorl.report.watchers import Json, Lines, Quiet, Watcher
 
-Kind = Literal["auto", "live", "lines", "json", "quiet"]
 
-
-def watcher(kind: Kind, config: Config, objectives: tuple[Objective, ...], console: Console) -> Watcher:
+def watcher(kind: str, config: Config, objectives: tuple[Objective, ...], console: Console) -> Watcher:
     """Who shows the events of a run: `with watcher(...) as watching: watching.show(event)`.
 
-    "auto" is a live view on a terminal, and lines elsewhere. With a person to be asked on this terminal a live view
-    becomes lines, too: it would draw over the question. JSON goes to standard output, whatever the console is.
+    "live" redraws a view of the run on a terminal; with a person to be asked on this terminal it becomes "lines", as it
+    would draw over the question. "lines" is one for each event. "json" goes to standard output, whatever the console
+    is. "quiet" shows nothing. Raises ValueError for another kind.
     """
-    if kind == "auto":
-        kind = "live" if console.is_terminal else "lines"
-    if kind == "live" and config.user == "terminal":
-        kind = "lines"
     match kind:
-        case "live":
+        case "live" if config.user != "terminal":
             return LiveView(config, objectives, console)
-        case "lines":
+        case "live" | "lines":
             return Lines(config, objectives, console)
         case "json":
             return Json(config, sys.stdout)
         case "quiet":
             return Quiet()
-    raise AssertionError(kind)
+    raise ValueError(f"unknown kind of progress {kind!r}; known: live, lines, json, quiet")

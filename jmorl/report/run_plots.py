@@ -23,7 +23,7 @@ from jmorl.report.style import (
     new_figure,
     note,
 )
-from jmorl.report.text import plural, short_count
+from jmorl.report.text import objective_label, plural, short_count
 from jmorl.storage.stored_run import StoredRun
 
 BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
@@ -38,10 +38,10 @@ def progress_figure(run: StoredRun, title: str) -> Figure:
     grid = figure.subplots(len(drawings), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for axes, draw in zip(grid, drawings, strict=True):
         draw(axes, run)
-        _mark_choices(axes, run)
+        for steps in _choice_steps(run):
+            axes.axvline(steps, color=PALE, linewidth=0.7, linestyle=":", zorder=0.5)
     figure.align_ylabels(grid)
-    marks = "; dotted: a choice" if run.config.method == "interactive" else ""
-    grid[-1].set_xlabel(f"environment steps used for learning{marks}")
+    grid[-1].set_xlabel(f"environment steps used for learning{'; dotted: a choice' if _choice_steps(run) else ''}")
     grid[-1].xaxis.set_major_formatter(FuncFormatter(lambda steps, _: short_count(max(steps, 0))))
     grid[-1].set_xlim(0, 1.03 * run.metrics["steps"][-1])
     return figure
@@ -65,19 +65,14 @@ def prediction_figure(run: StoredRun, title: str) -> Figure | None:
 
 def _changes(run: StoredRun) -> tuple[list[int], np.ndarray, np.ndarray] | None:
     """Generation, predicted and realised change [N, M] of all offspring; None if there are none."""
-    rows = [
-        (
-            policy.generation,
-            policy.predicted - run.policies[policy.parent].values,
-            policy.values - run.policies[policy.parent].values,
-        )
-        for policy in run.policies
-        if policy.predicted is not None and policy.parent is not None
-    ]
-    if not rows:
-        return None
-    generations, predicted, realised = zip(*rows, strict=True)
-    return list(generations), np.stack(predicted), np.stack(realised)
+    generations, predicted, realised = [], [], []
+    for policy in run.policies:
+        if policy.predicted is not None and policy.parent is not None:
+            parent = run.policies[policy.parent]
+            generations.append(policy.generation)
+            predicted.append(policy.predicted - parent.values)
+            realised.append(policy.values - parent.values)
+    return (generations, np.stack(predicted), np.stack(realised)) if generations else None
 
 
 def _draw_utility(axes: Axes, run: StoredRun) -> None:
@@ -122,13 +117,13 @@ def _focus(axes: Axes) -> None:
         note(axes, f"{plural(outside, 'point')} below")
 
 
-def _mark_choices(axes: Axes, run: StoredRun) -> None:
-    """A pale line where a choice was made."""
-    for record in run.decisions:
-        if isinstance(record, DecisionRecord) and record.purpose == "steer":
-            axes.axvline(
-                run.metrics["steps"][record.generation - 1], color=PALE, linewidth=0.7, linestyle=":", zorder=0.5
-            )
+def _choice_steps(run: StoredRun) -> list[float]:
+    """The environment steps after which the user was asked."""
+    return [
+        float(run.metrics["steps"][record.generation - 1])
+        for record in run.decisions
+        if isinstance(record, DecisionRecord) and record.purpose == "steer"
+    ]
 
 
 def _draw_prediction(axes: Axes, objective: Objective, pairs: np.ndarray, colours: list[Colour]) -> None:

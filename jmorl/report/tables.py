@@ -1,29 +1,30 @@
-"""What `jmorl show` prints of a run folder."""
+"""The tables that the commands print: a run folder, an evaluation, the environments."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
-from rich.console import Group
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from jmorl.decision.protocol import Adjust, Back, Choose
-from jmorl.decision.records import DecisionRecord, PointRecord, Record
+import envs
+from envs.core import Objective
+from jmorl.decision.records import DecisionRecord
+from jmorl.learning.rollout import EpisodeReturns
 from jmorl.report.fronts import front_table, plain_table, stacked_label
-from jmorl.report.text import REASONS, duration, number_format, plural, short_count
+from jmorl.report.text import REASONS, duration, number_format, objective_label, plural, short_count
 from jmorl.search.policy import values_of
 from jmorl.storage.stored_run import StoredRun
 
 
-def run_tables(run: StoredRun) -> Group:
-    """Heading, metrics, decisions and final front of a run, one below the other."""
-    parts = [run_heading(run), metrics_table(run)]
-    if run.decisions:
-        parts.append(decisions_table(run))
-    chosen = None if run.chosen is None else run.chosen.id
-    front = front_table(run.front, run.objectives, chosen)
+def run_tables(run: StoredRun) -> list[RenderableType]:
+    """Heading, metrics, decisions and final front of a run, to be printed one after the other."""
+    decisions = [decisions_table(run)] if run.decisions else []
+    front = front_table(run.front, run.objectives, run.chosen.id if run.chosen else None)
     front.title = "Final front" if run.result else "Front so far"
-    return Group(*[line for part in (*parts, front) for line in ("", part)])
+    tables = [run_heading(run), metrics_table(run), *decisions, front]
+    return [part for table in tables for part in (table, "")]
 
 
 def run_heading(run: StoredRun) -> Table:
@@ -80,31 +81,44 @@ def metrics_table(run: StoredRun) -> Table:
 def decisions_table(run: StoredRun) -> Table:
     """One row for each answer, with the policy it prefers."""
     formats = [number_format(column) for column in values_of(run.front).T]
-    table = plain_table(
-        "gen", "question", "among", "policy", *map(stacked_label, run.objectives), "", title="Decisions"
-    )
+    headings = map(stacked_label, run.objectives)
+    table = plain_table("gen", "question", "among", "policy", *headings, "", title="Decisions")
     for record in run.decisions:
-        policy, values, note = _answer(record)
-        cells = [f"{value:{fmt}}" for value, fmt in zip(values, formats, strict=True)] or [""] * len(formats)
-        table.add_row(str(record.generation), record.purpose, str(len(record.shown) or ""), policy, *cells, note)
+        if isinstance(record, DecisionRecord):
+            cells = [f"{value:{fmt}}" for value, fmt in zip(record.values, formats, strict=True)]
+            among = str(len(record.shown)) if record.shown else ""
+            more = f"go on for {plural(record.generations, 'generation')}" if record.generations > 1 else ""
+            note = "stop" if record.stop else more
+            table.add_row(str(record.generation), record.purpose, among, str(record.policy), *cells, note)
     return table
 
 
-def _answer(record: Record) -> tuple[str, tuple[float, ...], str]:
-    """The policy that an answer prefers and its values, empty if it prefers none, and what else it says."""
-    match record:
-        case DecisionRecord():
-            more = f"go on for {plural(record.generations, 'generation')}" if record.generations > 1 else ""
-            return str(record.policy), record.values, "stop" if record.stop else more
-        case PointRecord(answer=Choose(point)):
-            return str(record.shown[point].policy), record.shown[point].values, f"point {point + 1}"
-        case PointRecord(answer=Back(steps)):
-            return "", (), f"back by {steps}"
-        case PointRecord(answer=Adjust(0, _)):
-            return "", (), "end here"
-        case PointRecord(answer=Adjust(left, points)):
-            return "", (), f"{plural(left, 'iteration')} of {plural(points, 'point')}"
-    raise AssertionError(record)
+def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Table:
+    """What fresh episodes [N] of a stored policy with this header brought, beside its score in the run."""
+    undiscounted = np.asarray(returns.undiscounted, float)
+    table = plain_table("objective", "mean", "", "worst", "best", "in the run", "discounted")
+    table.title = f"Policy {header['id']} in {plural(len(undiscounted), 'fresh episode')} of {header['environment']}"
+    for index, fields in enumerate(header["objectives"]):
+        column = undiscounted[:, index]
+        fmt = number_format(column)
+        numbers = (column.min(), column.max(), header["values"][index], np.mean(returns.discounted[:, index]))
+        texts = [f"{value:{fmt}}" for value in numbers]
+        label = objective_label(Objective(**fields))
+        table.add_row(label, f"{column.mean():{fmt}}", f"±{column.std():{fmt}}", *texts)
+    return table
+
+
+def environments_table() -> Table:
+    """One row for each environment: what it optimises, and its sizes."""
+    table = plain_table("\nenvironment", "\nobjectives", "obser-\nvations", "\nactions", "time\nlimit")
+    for column in table.columns[:2]:
+        column.justify = "left"
+    for name in envs.ids():
+        environment = envs.make(name)
+        objectives = "\n".join(map(objective_label, environment.objectives))
+        sizes = environment.observation_size, environment.action_size, environment.time_limit
+        table.add_row(name, objectives, *map(str, sizes))
+    return table
 
 
 def _texts(column: np.ndarray, text: str | Callable[[float], str]) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.core import Objective
+from jmorl.report.limits import core
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 REASONS = {  # why a run ended
@@ -16,12 +17,13 @@ REASONS = {  # why a run ended
 
 
 def number_format(values: np.ndarray, digits: int = 3) -> str:
-    """A format that shows the range of the values [N] with so many significant digits.
+    """A format that shows the range of most of the values [N] with so many significant digits.
 
-    NaN is ignored; without a range, that of the first value's distance to 0 counts.
+    NaN is ignored, and values far out do not count; without a range, the distance to 0 does.
     """
     present = values[~np.isnan(values)]
-    extent = (np.ptp(present) or abs(present[0]) or 1.0) if len(present) else 1.0
+    near = present[core(present[:, None])]
+    extent = (np.ptp(near) or abs(near[0]) or 1.0) if len(near) else 1.0
     if len(present) and np.abs(present).max() >= 1e9 or extent < 1e-6:
         return f".{digits}g"
     return f".{max(digits - 1 - math.floor(math.log10(extent)), 0)}f"

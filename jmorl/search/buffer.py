@@ -14,7 +14,7 @@ from jmorl.search.weights import simplex_grid
 
 @dataclass(frozen=True)
 class PerformanceBuffer:
-    """The best policies of each direction from the origin of the scale (Xu et al. 2020, section 3.3)."""
+    """The best policies of each direction from the origin of the scale (Xu et al. 2020)."""
 
     bins: int  # most directions
     size: int  # most policies in a direction

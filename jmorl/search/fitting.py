@@ -17,7 +17,7 @@ SMALLEST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-1, 1e9
 
 
 def tanh_curve(parameters: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """`A tanh(a (x - b) / 2) + c` (Xu et al. 2020, section 3.4), parameters [4, F], x [R, F] -> [R, F]."""
+    """`A tanh(a (x - b) / 2) + c` (Xu et al. 2020), parameters [4, F], x [R, F] -> [R, F]."""
     amplitude, steepness, centre, offset = parameters
     return amplitude * np.tanh(steepness * (x - centre) / 2) + offset
 
@@ -30,7 +30,7 @@ def fit_tanh(
     """The bounded soft-L1 fit of `tanh_curve` to each column of (x, y).
 
     Minimises `s^2 sum(sqrt(1 + (r / s)^2) - 1)`, where `r = importance (curve - y)` and s is the loss scale,
-    by Levenberg-Marquardt on all fits together, with the damping of Nielsen (1999, equation 2.21). Starts at
+    by Levenberg-Marquardt on all fits together, with the damping of Nielsen (1999). Starts at
     half the range of y, 1, 0 and the mean of y. Every fit needs a record.
     """
     lower, upper, parameters = _box_and_start(y, importance > 0)
@@ -86,7 +86,7 @@ def _derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gradient [4, F] of the cost, and its Gauss-Newton curvature [4, 4, F].
 
-    The curvature includes the bend of the loss (Triggs et al. 2000, section 4.3); soft-L1 keeps it positive.
+    The curvature includes the bend of the loss (Triggs et al. 2000); soft-L1 keeps it positive.
     """
     amplitude, steepness, centre, offset = parameters
     t = np.tanh(steepness * (x - centre) / 2)

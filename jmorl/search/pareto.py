@@ -16,12 +16,11 @@ def hypervolume(values: np.ndarray, reference: np.ndarray) -> float:
 
     Vectors that are not above it in every objective contribute nothing; N may be zero.
     """
-    above = values[(values > reference).all(axis=1)]
-    return float(moocore.hypervolume(above, ref=reference, maximise=True)) if len(above) else 0.0
+    return float(moocore.hypervolume(values, ref=reference, maximise=True))
 
 
 def sparsity(values: np.ndarray) -> float:
-    """Mean squared gap between neighbours, objective by objective (Xu et al. 2020, section 3.2).
+    """Mean squared gap between neighbours, objective by objective (Xu et al. 2020).
 
     Over the non-dominated subset of the vectors [N, M], sorted in each objective; 0 with fewer than two.
     """

@@ -1,4 +1,4 @@
-"""What training a policy with given weights is expected to lead to (Xu et al. 2020, section 3.4).
+"""What training a policy with given weights is expected to lead to (Xu et al. 2020).
 
 All values here are scaled by the range of the front (`jmorl.search.scaling`), so no constant depends on units.
 """

@@ -1,4 +1,4 @@
-"""Which policies are trained next, with which weights (Xu et al. 2020, section 3.4).
+"""Which policies are trained next, with which weights (Xu et al. 2020).
 
 Letters: Q pairs of candidate and weights, N members of the front, M objectives. All values in one scale.
 """

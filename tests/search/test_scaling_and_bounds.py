@@ -22,7 +22,7 @@ REFERENCE = np.array([-10.0, -20.0])
 
 def test_range_becomes_zero_to_one() -> None:
     values = np.array([[-10.0, 3.0, 7.0], [30.0, 5.0, 7.0], [0.0, 4.0, 7.0]])
-    np.testing.assert_allclose(range_scale(values).apply(values), [[0, 0, 0], [1, 1, 0], [0.25, 0.5, 0]])
+    np.testing.assert_allclose(range_scale(values).apply(values), [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.25, 0.5, 0.0]])
 
 
 @given(vector_sets)

@@ -102,7 +102,7 @@ def uncovered(
     """The predictions that no member of the front is at least as good as; the front; the reference."""
     front = front[non_dominated(front)]
     points = predictions.reshape(-1, predictions.shape[2])
-    covered = (front[None] >= points[:, None]).all(axis=2).any(axis=1)
+    covered = np.any(np.all(front[None] >= points[:, None], axis=2), axis=1)
     return points[~covered], front, reference
 
 

@@ -1,0 +1,190 @@
+"""The plots: what they show, and that they can be drawn of every kind of run."""
+
+import io
+from dataclasses import replace
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
+
+from jmorl.report.front_plot import choices_of, close_view, front_figure, whole_view
+from jmorl.report.limits import inside
+from jmorl.report.many_plot import parallel_figure
+from jmorl.report.plots import draw_run
+from jmorl.report.run_plots import prediction_figure, progress_figure
+from jmorl.report.style import RED, style
+from jmorl.search.pareto import non_dominated
+from jmorl.search.policy import values_of
+
+ALL = ["front.png", "prediction.png", "progress.png"]
+
+
+def pixels(path):
+    return imread(path)[..., :3]
+
+
+def has_colour(image, colour):
+    return (np.abs(image - np.array(to_rgb(colour))).max(axis=-1) < 0.02).sum() > 30
+
+
+def texts(figure):
+    """Everything that is written in a figure."""
+    figure.draw_without_rendering()
+    return [text.get_text() for text in figure.findobj(matplotlib.text.Text) if text.get_visible() and text.get_text()]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "names"),
+    [
+        ({}, ALL),
+        ({"objectives": 3}, ["front.png", "front_pairs.png", "prediction.png", "progress.png"]),
+        ({"interactive": False, "has_utility": False}, ALL),
+        ({"generations": 0, "finished": False}, ["front.png", "progress.png"]),
+    ],
+)
+def test_every_kind_of_run_can_be_drawn(make_run, tmp_path, kinds, names):
+    before = dict(matplotlib.rcParams)
+    run = make_run(**kinds)
+    paths = draw_run(run, tmp_path / "deep" / "plots")
+    assert paths == [tmp_path / "deep" / "plots" / name for name in names]
+    assert sorted(path.name for path in paths[0].parent.iterdir()) == names
+    for path in paths:
+        image = pixels(path)
+        height, width, _ = image.shape
+        assert width > 900 and height > 600
+        assert 0.01 < (image < 0.97).any(axis=-1).mean() < 0.9
+        # Nothing is cut off at the edges.
+        frame = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+        assert (frame == 1).all()
+    assert has_colour(pixels(paths[0]), RED) == (run.chosen is not None)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_the_stairs_are_the_edge_of_what_the_front_dominates(make_run):
+    run = make_run(outliers=0)
+    with style():
+        figure = front_figure(run, "title")
+    axes = figure.axes[0]
+    stairs = [line for line in axes.get_lines() if line.get_drawstyle() == "steps-pre"]
+    assert len(stairs) == 11
+    final, limits = stairs[-1], whole_view(run)
+    front = values_of(run.front)
+    x, y = final.get_data()
+    for column in np.linspace(limits[0, 0], x[-1], 200)[1:-1]:
+        # Steps are drawn before their point: at `column` the line has the height of the next point to the right.
+        height = y[np.searchsorted(x, column)]
+        best = front[front[:, 0] >= column, 1].max()
+        assert height == best
+    early = np.array(stairs[0].get_data()).T
+    warmed_up = values_of([policy for policy in run.policies if policy.generation == 0])
+    for point in warmed_up[non_dominated(warmed_up)]:
+        assert (early == point).all(axis=1).any()
+
+
+def test_hopeless_policies_do_not_squash_the_front(make_run):
+    with_outliers, without = make_run(outliers=5), make_run(outliers=0)
+    assert whole_view(with_outliers)[0, 0] > -400
+    assert np.ptp(close_view(with_outliers), axis=0) == pytest.approx(np.ptp(close_view(without), axis=0), rel=0.01)
+    with style():
+        figure = front_figure(with_outliers, "title")
+    noted = [text for text in texts(figure) if text.endswith("outside")]
+    for note, axes in zip(noted, figure.axes[:2], strict=True):
+        limits = np.array([axes.get_xlim(), axes.get_ylim()]).T
+        outside = (~inside(values_of(with_outliers.policies), limits)).sum()
+        assert note == f"{outside} of 66 policies outside"
+    assert noted[0] == "5 of 66 policies outside"
+
+
+def test_the_close_up_shows_the_chosen_policy_even_if_it_is_far_out(make_run):
+    run = make_run()
+    limits = close_view(run)
+    assert inside(run.chosen.values, limits)
+    policies = list(run.policies)
+    policies[run.chosen.id] = replace(run.chosen, values=np.array([-700.0, -5.0]))
+    far = replace(run, policies=tuple(policies))
+    assert inside(far.chosen.values, close_view(far)) and not inside(far.chosen.values, limits)
+
+
+def test_axes_have_quantity_and_unit(make_run):
+    with style():
+        for figure in (front_figure(make_run(), "title"), parallel_figure(make_run(objectives=3), "title")):
+            assert {"time (-steps)", "fuel (-force²·steps)"} <= set(texts(figure))
+
+
+def test_dollar_signs_are_no_formulae(make_run):
+    run = make_run(generations=1)
+    dear = replace(run, objectives=tuple(replace(each, unit="$^{-1}_$") for each in run.objectives))
+    with style():
+        figure = front_figure(dear, "title")
+        figure.savefig(io.BytesIO(), format="png")
+    assert "time ($^{-1}_$)" in texts(figure)
+
+
+def test_choices_are_numbered_by_generation_and_drawn_together(make_run):
+    run = make_run()
+    numbered = {text for text, _ in choices_of(run)}
+    assert "7–8" in numbered and "9" in numbered
+    with style():
+        assert numbered <= set(texts(front_figure(run, "title")))
+
+
+def test_labels_of_choices_cover_neither_each_other_nor_policies(make_run):
+    run = make_run()
+    with style():
+        figure = front_figure(run, "title")
+        figure.savefig(io.BytesIO(), format="png")  # as it will be drawn
+        for axes in figure.axes[:2]:
+            labels = [text for text in axes.texts if text.get_bbox_patch() is not None]
+            boxes = [label.get_bbox_patch().get_window_extent() for label in labels]
+            assert labels
+            shown = axes.transData.transform([values for _, values in choices_of(run)])
+            front = axes.transData.transform(values_of(run.front))
+            for index, box in enumerate(boxes):
+                assert not any(box.overlaps(other) for other in boxes[:index])
+                assert not box.count_contains(shown) and not box.count_contains(front)
+
+
+@pytest.mark.parametrize(("has_utility", "panels"), [(True, 3), (False, 2)])
+def test_progress_has_utility_only_if_there_is_one(make_run, has_utility, panels):
+    run = make_run(has_utility=has_utility)
+    with style():
+        figure = progress_figure(run, "title")
+    assert len(figure.axes) == panels
+    lines = figure.axes[0].get_lines()
+    first = run.metrics["utility_max" if has_utility else "hypervolume"]
+    assert np.array_equal(lines[0].get_ydata(), first) and np.array_equal(lines[0].get_xdata(), run.metrics["steps"])
+    assert len(figure.axes[0].get_lines()) == (3 if has_utility else 1) + 10  # with a mark for each choice
+
+
+def test_a_bad_start_does_not_hide_the_progress_after_it(make_run):
+    run = make_run()
+    hypervolume = np.array([-1e6, *np.linspace(100, 110, 10)])
+    run = replace(run, metrics={**run.metrics, "hypervolume": hypervolume})
+    with style():
+        figure = progress_figure(run, "title")
+    low, high = figure.axes[1].get_ylim()
+    assert 90 < low < 100 and 110 < high < 120
+    assert "1 point below" in texts(figure)
+
+
+def test_predictions_are_compared_with_what_came_of_them(make_run):
+    run = make_run()
+    with style():
+        figure = prediction_figure(run, "title")
+        assert prediction_figure(make_run(generations=0), "title") is None
+    offspring = [policy for policy in run.policies if policy.generation > 0]
+    for index, axes in enumerate(figure.axes[:2]):
+        [points] = axes.collections
+        expected = [
+            (
+                policy.predicted[index] - run.policies[policy.parent].values[index],
+                policy.values[index] - run.policies[policy.parent].values[index],
+            )
+            for policy in offspring
+        ]
+        assert np.allclose(points.get_offsets(), expected)
+        error = np.mean([abs(predicted - realised) for predicted, realised in expected])
+        assert f"mean error {error:.3g};" in axes.get_title(loc="left")
+        assert axes.get_xlim() == axes.get_ylim()

@@ -1,0 +1,129 @@
+"""The tables that the commands print."""
+
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import envs
+from jmorl.learning.rollout import EpisodeReturns
+from jmorl.report.tables import environments_table, evaluation_table, run_tables
+
+
+def printed(renderables, width=80):
+    file = io.StringIO()
+    console = Console(file=file, width=width)
+    for renderable in renderables:
+        console.print(renderable)
+    return file.getvalue()
+
+
+def section(text, title):
+    """The rows of the table with this title, in words."""
+    lines = iter(text.splitlines())
+    while not next(lines).startswith(title):
+        pass
+    while not next(lines).startswith("─"):
+        pass
+    found = []
+    for line in lines:
+        if not line.strip():
+            break
+        found.append(line.split())
+    return found
+
+
+@pytest.mark.parametrize("width", [80, 100, 140])
+@pytest.mark.parametrize("kinds", [{}, {"objectives": 3}, {"has_utility": False}, {"interactive": False}])
+def test_everything_fits(make_run, width, kinds):
+    text = printed(run_tables(make_run(**kinds)), width)
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= width
+    # No cell is broken over two lines: there is a line for each generation and each member.
+    run = make_run(**kinds)
+    assert len(section(text, "Generations")) == 11
+    assert len(section(text, "Final front")) == len(run.front)
+
+
+def test_the_heading_sums_the_run_up(make_run):
+    text = printed(run_tables(make_run()))
+    for line in (
+        "environment  mo-mountaincarcontinuous-v0",
+        "method       interactive, user A, seed 1",
+        "population   6 agents, 4 environments each",
+        "devices      2 × cpu",
+        "steps        2.64 M (and 99.0 k to evaluate)",
+        # 11 generations of 10 seconds, and 0.1 for selection in all but the warm-up
+        "time         1 min 51 s, 23.8 k steps/s; answers not counted",
+        "state        finished: the budget of environment steps is used up",
+    ):
+        assert line in text
+
+
+def test_a_row_for_every_generation(make_run):
+    rows = section(printed(run_tables(make_run())), "Generations")
+    assert rows[0] == ["0", "240", "k", "23.5", "k", "4", "0", "-145.99", "-248.46", "10.0"]
+    assert rows[10][:3] == ["10", "2.64", "M"]
+    assert rows[10][-3:] == ["30", "2.0%", "10.1"]
+
+
+def test_what_a_run_lacks_has_no_column(make_run):
+    assert "utility" not in printed(run_tables(make_run(has_utility=False)))
+    only_warm_up = printed(run_tables(make_run(generations=0)))
+    assert "predict" not in only_warm_up and "candi" not in only_warm_up
+    assert "Decisions" not in printed(run_tables(make_run(generations=0, finished=False)))
+
+
+def test_a_row_for_every_decision(make_run):
+    run = make_run()
+    rows = section(printed(run_tables(run)), "Decisions")
+    assert rows[0] == ["1", "steer", "4", "2", "-200.7", "-91.3"]
+    assert rows[-1] == ["11", "final", "5", "58", "-91.7", "-38.9"]
+    assert len(rows) == len(run.decisions)
+
+
+@pytest.mark.parametrize(
+    ("changes", "note"), [({"stop": True}, "stop"), ({"generations": 3}, "go on for 3 generations"), ({}, "")]
+)
+def test_a_decision_may_say_what_comes_next(make_run, changes, note):
+    from dataclasses import replace
+
+    run = make_run()
+    run = replace(run, decisions=(replace(run.decisions[0], **changes),))
+    assert " ".join(section(printed(run_tables(run)), "Decisions")[0][6:]) == note
+
+
+def test_the_chosen_policy_is_marked_once_the_run_has_ended(make_run):
+    finished, unfinished = printed(run_tables(make_run())), printed(run_tables(make_run(finished=False)))
+    assert [row[0] for row in section(finished, "Final front") if row[-1] == "chosen"] == ["58"]
+    assert "chosen" not in unfinished
+    assert "state        unfinished" in unfinished and "Front so far" in unfinished
+
+
+def test_an_evaluation_is_mean_spread_and_extremes():
+    returns = np.random.default_rng(1).normal([-70, -40], [2, 5], (50, 2))
+    objectives = [vars(objective) for objective in envs.make("mo-mountaincarcontinuous-v0").objectives]
+    header = {
+        "id": 17,
+        "environment": "mo-mountaincarcontinuous-v0",
+        "objectives": objectives,
+        "values": [-71.0, -39.0],
+    }
+    text = printed([evaluation_table(header, EpisodeReturns(returns, 0.5 * returns, np.full(50, 70)))])
+    assert text.startswith("Policy 17 in 50 fresh episodes of mo-mountaincarcontinuous-v0")
+    for row, column, stored in zip(section(text, "Policy 17"), returns.T, header["values"], strict=True):
+        expected = [column.mean(), column.std(), column.min(), column.max(), stored, 0.5 * column.mean()]
+        numbers = [float(word.strip("±")) for word in row[2:]]
+        assert numbers == pytest.approx(expected, abs=0.051)
+
+
+def test_every_environment_is_listed():
+    text = printed([environments_table()], width=100)
+    for name in envs.ids():
+        environment = envs.make(name)
+        [row] = [line for line in text.splitlines() if line.startswith(f"{name} ")]
+        sizes = [environment.observation_size, environment.action_size, environment.time_limit]
+        assert row.split()[-3:] == [str(size) for size in sizes]
+        for objective in environment.objectives:
+            assert f"{objective.label} ({objective.unit})" in text

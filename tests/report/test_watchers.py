@@ -1,0 +1,157 @@
+"""Watching a run: in lines, as JSON, live, or not at all."""
+
+import io
+import json
+import threading
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from jmorl.config import resolve
+from jmorl.report.live import LiveView
+from jmorl.report.progress import watcher
+from jmorl.report.watchers import Lines
+from jmorl.run import GenerationFinished
+from tests.report.conftest import OBJECTIVES
+
+
+def shown(kind, events, width=80, height=40, objectives=2, **config):
+    file = io.StringIO()
+    console = Console(file=file, width=width, height=height)
+    with watcher(kind, resolve(overrides=config), OBJECTIVES[:objectives], console) as watching:
+        for event in events:
+            watching.show(event)
+    return file.getvalue()
+
+
+def test_there_is_a_line_for_every_event_and_the_result_as_a_table(make_events):
+    events = make_events()
+    lines = shown("lines", events).splitlines()
+    starts = ["compiled in 3.2 s on 2 devices", "warm-up: 240 k steps, 23.5 k steps/s, front of 4,"]
+    for generation in range(1, 11):
+        starts += [f"choice for generation {generation}: policy ", f"generation {generation} of 10: "]
+    starts += [
+        "final choice: policy 58 ",
+        "finished: the budget of environment steps is used up; the result is policy 58",
+    ]
+    assert len(starts) == len(events)
+    for line, start in zip(lines, starts, strict=False):
+        assert line.startswith(start)
+    assert lines[len(starts) : len(starts) + 2] == ["", "Final front" + " " * (len(lines[len(starts) + 1]) - 11)]
+    [chosen] = [line for line in lines if line.rstrip().endswith("chosen")]
+    assert chosen.split()[:5] == ["58", "-91.7", "±0.9", "-38.9", "±0.4"]
+
+
+def test_a_choice_is_said_with_values_and_bounds(make_events):
+    events = make_events()
+    text = shown("lines", events)
+    assert "choice for generation 10: policy 58 (time -91.7, fuel -38.9) of 5 shown; bounds time ≥ " in text
+    time, fuel = next(event.bounds for event in reversed(events[:-2]) if hasattr(event, "bounds"))
+    assert f"bounds time ≥ {time:.1f}, fuel ≥ {fuel:.1f}" in text
+
+
+def test_a_person_without_utility_gets_no_utility(make_events):
+    assert "utility" in shown("lines", make_events())
+    assert "utility" not in shown("lines", make_events(has_utility=False))
+    assert "utility" not in shown("live", make_events(has_utility=False))
+
+
+def test_json_is_strict_and_complete(make_events, capsys):
+    events = make_events()
+    assert shown("json", events) == ""
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    found = [json.loads(line, parse_constant=refuse) for line in capsys.readouterr().out.splitlines()]
+    assert len(found) == len(events)
+    assert [each["event"] for each in found[:4]] == ["compiled", "generation", "decided", "generation"]
+    warm_up, last, finished = found[1], found[-3], found[-1]
+    assert warm_up["bounds"] == [None, None] and warm_up["prediction_error"] is None
+    finishes = [event for event in events if isinstance(event, GenerationFinished)]
+    assert last["hypervolume"] == finishes[-1].front.hypervolume
+    assert last["steps"] == 2_640_000 and last["generation"] == last["generations"] == 10
+    assert [policy["policy"] for policy in last["front"]] == [p.id for p in finishes[-1].state.archive.members]
+    assert found[2]["values"] == events[2].chosen.values.tolist() and found[2]["shown"] == 4
+    assert np.isfinite(found[2]["bounds"]).all()
+    assert finished["reason"] == "budget" and finished["chosen"]["policy"] == events[-1].chosen.id
+
+
+def test_quiet_says_nothing(make_events, capsys):
+    assert shown("quiet", make_events()) == ""
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_live_view_never_covers_a_question_at_this_terminal():
+    console = Console(file=io.StringIO(), force_terminal=True)
+    kinds = {
+        user: type(watcher("live", resolve(overrides={"user": user}), OBJECTIVES[:2], console))
+        for user in ("A", "terminal")
+    }
+    assert kinds == {"A": LiveView, "terminal": Lines}
+
+
+def test_an_unknown_kind_is_refused():
+    with pytest.raises(ValueError, match="'loud'; known: live, lines, json, quiet"):
+        watcher("loud", resolve(), OBJECTIVES[:2], Console())
+
+
+@pytest.mark.parametrize("objectives", [2, 3])
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (100, 40), (140, 60)])
+def test_every_frame_of_a_live_view_fits_on_the_screen(make_events, width, height, objectives):
+    now = iter(range(10_000))
+    console = Console(file=io.StringIO(), width=width, height=height)
+    view = LiveView(resolve(), OBJECTIVES[:objectives], console, clock=lambda: float(next(now)))
+    for event in make_events(objectives=objectives, outliers=0):
+        view.timeline = view.timeline.after(event, float(next(now)))
+        lines = console.render_lines(view.panel())
+        assert objectives == 3 or len(lines) < height
+        texts = ["".join(segment.text for segment in line) for line in lines]
+        assert all(len(text.rstrip()) <= width and "…" not in text for text in texts)
+
+
+def test_a_live_view_tells_where_the_run_stands(make_events):
+    file = io.StringIO()
+    console = Console(file=file, width=90, height=40)
+    clock = [0.0]
+    view = LiveView(resolve(), OBJECTIVES[:2], console, clock=lambda: clock[0])
+    for event in make_events()[:5]:  # up to the second choice
+        view.timeline = view.timeline.after(event, clock[0])
+    clock[0] = 2.6
+    console.print(view.panel())
+    text = file.getvalue()
+    # A generation took 10.1 seconds; the second of ten is going on.
+    for fact in (
+        "generation 2 of 10",
+        "541 k of 2.64 M steps",
+        "next question  in 7.5 s",
+        "end            in about 1 min 28 s",
+        "speed          23.6 k steps/s",
+        "utility        best -122.9, mean -132.7",
+        "last choice    policy 7: time -170.2, fuel -75.6",
+        "bounds         time ≥ -178.1, fuel ≥ -79.8",
+        "(time)",
+    ):
+        assert fact in text
+
+
+def test_a_live_view_leaves_its_last_state_and_the_result(make_events):
+    text = shown("live", make_events())
+    assert text.count("finished") == 1 and text.count("Final front") == 1
+    assert text.index("finished") < text.index("Final front")
+
+
+def test_a_live_view_is_redrawn_while_the_run_computes(make_events):
+    frames = threading.Semaphore(0)
+
+    class Screen(io.StringIO):
+        def write(self, text):
+            if "compiling" in text:
+                frames.release()
+            return super().write(text)
+
+    console = Console(file=Screen(), width=80, force_terminal=True, _environ={"TERM": "xterm"})
+    with watcher("live", resolve(), OBJECTIVES[:2], console):
+        # The main thread is stuck here, as in a compiled call, and yet frames come.
+        assert all(frames.acquire(timeout=20) for _ in range(3))

@@ -1,0 +1,194 @@
+"""The command line: what it makes, what it prints, and that bad input makes nothing."""
+
+import csv
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import envs
+from jmorl import load_policy, read_run
+from jmorl.cli import main
+from jmorl.run import evaluation_keys
+from jmorl.scoring import evaluate_stored
+
+TRAIN = [
+    *("train", "--env", "probe-three-ways", "--user", "weights=0.5,0.3,0.2", "--steps", "2112", "--quiet"),
+    *("--population.agents", "4", "--population.warmup-iterations", "2", "--population.iterations", "3"),
+    *("--ppo.environments", "3", "--ppo.rollout-steps", "16", "--ppo.minibatches", "4", "--ppo.epochs", "2"),
+    *("--evaluation.episodes", "2", "--search.weight-divisions", "4"),
+]
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    assert main([*TRAIN, "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(trained, tmp_path):
+    """A copy that a test may spoil."""
+    return shutil.copytree(trained, tmp_path / "copy")
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_run_folder_is_complete(trained):
+    manifest = json.loads((trained / "manifest.json").read_text())
+    assert manifest["packages"]["jax"] and manifest["seed"] == 1 and manifest["device"]["count"] == 2
+    assert [row["generation"] for row in rows(trained / "metrics.csv")] == ["0", "1", "2", "3"]
+    assert len(rows(trained / "policies.csv")) == 16
+    assert len((trained / "decisions.jsonl").read_text().splitlines()) == 4
+    assert {path.name for path in (trained / "plots").iterdir()} == {
+        *("front.png", "front_pairs.png", "prediction.png", "progress.png")
+    }
+    assert not [path for path in trained.rglob("*") if path.name.startswith(".")]
+
+
+def test_every_policy_of_the_front_has_a_file_with_its_scores(trained):
+    for row in rows(trained / "front.csv"):
+        policy = load_policy(trained / "policies" / f"{int(row['policy']):05d}.npz")
+        assert policy.header["values"] == [float(row[f"value_{name}"]) for name in ("north", "east", "west")]
+        action = policy(np.zeros((5, 2)))
+        assert action.shape == (5, 2) and (np.abs(action) <= 1).all()
+
+
+def test_the_run_reads_back(trained):
+    run = read_run(trained)
+    assert run.config.population.agents == 4
+    assert run.result["reason"] == "budget"
+    assert run.chosen.id in [policy.id for policy in run.front]
+    assert (run.bounds[0] == -np.inf).all() and np.isfinite(run.bounds[1:]).all()
+
+
+def test_a_stored_policy_scores_as_in_its_run_from_the_runs_starts(trained):
+    run = read_run(trained)
+    returns = evaluate_stored(load_policy(trained / "chosen.npz"), evaluation_keys(run.config))
+    np.testing.assert_allclose(returns.undiscounted.mean(0), run.chosen.values, rtol=1e-5)
+
+
+def test_evaluate_prints_every_return_and_repeats_itself(trained, capsys):
+    outputs = []
+    for _ in range(2):
+        assert main(["evaluate", str(trained), "--episodes", "40", "--seed", "3", "--json"]) == 0
+        outputs.append(json.loads(capsys.readouterr().out))
+    assert outputs[0] == outputs[1]
+    returns = np.array(outputs[0]["returns"])
+    assert returns.shape == (40, 3)
+    assert main(["evaluate", str(trained / "chosen.npz"), "--episodes", "40", "--seed", "4", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["returns"] != outputs[0]["returns"]
+
+
+def test_replaying_the_decisions_gives_the_same_run(trained, tmp_path):
+    again = tmp_path / "again"
+    arguments = [argument for argument in TRAIN if not argument.startswith("weights=")]
+    arguments[arguments.index("--user") + 1 : arguments.index("--user") + 1] = [f"script={trained}/decisions.jsonl"]
+    assert main([*arguments, "--out", str(again)]) == 0
+    assert (again / "policies.csv").read_bytes() == (trained / "policies.csv").read_bytes()
+    assert (again / "decisions.jsonl").read_bytes() == (trained / "decisions.jsonl").read_bytes()
+
+
+def test_the_config_of_a_run_makes_the_same_run(trained, tmp_path):
+    again = tmp_path / "again"
+    assert main(["train", "--config", str(trained / "config.toml"), "--quiet", "--out", str(again)]) == 0
+    assert (again / "policies.csv").read_bytes() == (trained / "policies.csv").read_bytes()
+
+
+def test_json_is_one_object_for_each_event(tmp_path, capsys):
+    assert main([*(a for a in TRAIN if a != "--quiet"), "--json", "--out", str(tmp_path / "run")]) == 0
+    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert len(events) == 1 + 4 + 4 + 1
+
+
+@pytest.mark.parametrize("user", [None, "weights=0,0,1"])
+def test_enautilus_ends_on_a_policy_of_the_front(folder, capsys, user):
+    arguments = ["enautilus", str(folder), "--json", *(["--user", user] if user else [])]
+    assert main(arguments) == 0
+    chosen = json.loads(capsys.readouterr().out)
+    assert str(chosen["policy"]) in [row["policy"] for row in rows(folder / "front.csv")]
+    log = folder / "enautilus.jsonl"
+    assert main(["enautilus", str(folder), "--json", "--user", f"script={log}"]) == 0
+    assert json.loads(capsys.readouterr().out) == chosen
+
+
+def test_show_prints_the_front_and_draws(folder, capsys):
+    shutil.rmtree(folder / "plots")
+    assert main(["show", str(folder)]) == 0
+    assert "north" in capsys.readouterr().out
+    assert (folder / "plots" / "front.png").exists()
+
+
+def test_envs_lists_every_environment(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "140")
+    assert main(["envs"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in envs.ids())
+
+
+def test_a_run_is_not_overwritten_without_force(folder, capsys):
+    before = (folder / "policies.csv").read_bytes()
+    assert main([*TRAIN, "--out", str(folder)]) == 2
+    assert "already holds a run" in capsys.readouterr().err
+    assert (folder / "policies.csv").read_bytes() == before
+    assert main([*TRAIN, "--seed", "2", "--out", str(folder), "--force"]) == 0
+    assert (folder / "policies.csv").read_bytes() != before
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_a_folder_that_is_no_run_is_never_overwritten(tmp_path, capsys, force):
+    (tmp_path / "letter.txt").write_text("dear")
+    assert main([*TRAIN, "--out", str(tmp_path), *force]) == 2
+    assert "not a run" in capsys.readouterr().err
+    assert (tmp_path / "letter.txt").read_text() == "dear"
+
+
+def test_all_bad_input_is_named_at_once_and_nothing_is_made(tmp_path, capsys):
+    used = tmp_path / "used"
+    used.mkdir()
+    (used / "file").touch()
+    arguments = [
+        *("train", "--env", "nowhere", "--method", "magic", "--user", "Z", "--steps", "2.5"),
+        *("--population.agents", "-1", "--ppo.minibatches", "7", "--preset", "fancy", "--out", str(used)),
+    ]
+    assert main(arguments) == 2
+    errors = capsys.readouterr().err.splitlines()
+    names = ("env", "method", "user", "steps", "population.agents", "ppo.minibatches", "preset", "out")
+    for name in names:
+        assert [line for line in errors if line.startswith(f"jmorl: {name}: ")], name
+    assert len(errors) == len(names)
+    assert [path.name for path in used.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["train", "--user", "target=1,2,3"], "user: target must have one number for each of 2 objectives"),
+        (["train", "--user", "script=/nowhere"], "user: there is no decision log"),
+        (["train", "--config", "/nowhere.toml"], "config: cannot read /nowhere.toml"),
+        (["show", "/nowhere"], "/nowhere is not a run folder"),
+        (["enautilus", "/nowhere"], "/nowhere is not a run folder"),
+        (["evaluate", "/nowhere.npz"], "/nowhere.npz is not a policy file"),
+    ],
+)
+def test_bad_input_is_one_clear_message(arguments, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) == 1 and errors[0].startswith(f"jmorl: {message}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_script_that_does_not_fit_stops_the_run_and_keeps_what_it_had(trained, tmp_path, capsys):
+    log = tmp_path / "log.jsonl"
+    log.write_text((trained / "decisions.jsonl").read_text().splitlines()[0] + "\n")
+    arguments = [f"script={log}" if argument.startswith("weights=") else argument for argument in TRAIN]
+    assert main([*arguments, "--out", str(tmp_path / "run")]) == 1
+    assert "no decision for generation 2" in capsys.readouterr().err
+    assert len(rows(tmp_path / "run" / "metrics.csv")) == 2
+    assert main(["show", str(tmp_path / "run")]) == 0
