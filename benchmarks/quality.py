@@ -15,20 +15,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import envs
 import jax
 import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+import envs
+from benchmarks.exact_front import exact_front
 from jmorl.config import Config, resolve
 from jmorl.decision.utility import USERS
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.moppo import MOPPO
 from jmorl.run import GenerationFinished, RunFinished, evaluation_keys, run
 from jmorl.search.policy import Policy, values_of
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
-
-from benchmarks.exact_front import exact_front
 
 ENVIRONMENT = "mo-mountaincarcontinuous-v0"
 SEEDS = (1, 7, 10, 42, 100)
@@ -42,7 +42,7 @@ def main() -> None:
     """Run everything that is asked for, print the table and write the result."""
     options = _options()
     use_all_cpu_cores()
-    runs = [(method, user, seed) for seed in options.seeds for method, user in _arms(options.users)]
+    runs = [(method, user, seed) for seed in options.seeds for method, user in _arms(options)]
     rows: list[dict[str, Any]] = []
     for method, user, seed in track(runs, console=Console(stderr=True), disable=not sys.stderr.isatty()):
         overrides = {"env": ENVIRONMENT, "method": method, "user": user, "seed": seed}
@@ -60,6 +60,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--users", nargs="+", choices=USERS, default=list(USERS))
+    parser.add_argument("--methods", nargs="+", choices=("pgmorl", "interactive"), default=["pgmorl", "interactive"])
     parser.add_argument("--preset", default="default")
     parser.add_argument("--set", type=_setting, nargs="+", default=[], metavar="SECTION.NAME=VALUE")
     parser.add_argument("--out", type=Path, default=RESULT)
@@ -78,10 +79,12 @@ def _setting(text: str) -> tuple[str, str, str]:
     return section, field, value
 
 
-def _arms(users: list[str]) -> Iterator[tuple[str, str]]:
-    yield "pgmorl", users[0]
-    for user in users:
-        yield "interactive", user
+def _arms(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
+    """Method and user of each run; PGMORL asks nobody, so one run serves all users."""
+    if "pgmorl" in options.methods:
+        yield "pgmorl", options.users[0]
+    if "interactive" in options.methods:
+        yield from (("interactive", user) for user in options.users)
 
 
 def _judged(config: Config, users: list[str]) -> list[dict[str, Any]]:
@@ -159,7 +162,15 @@ def _table(rows: list[dict[str, Any]]) -> Table:
 def _summary(rows: list[dict[str, Any]]) -> Table:
     """Means over the seeds; a run that never came close counts with all its steps, marked by >=."""
     table = Table(title="Means over seeds")
-    for column in ("user", "method", "shortfall %", "worst seed %", "fresh episodes %", "steps to 5 %", "seconds a run"):
+    for column in (
+        "user",
+        "method",
+        "shortfall %",
+        "worst seed %",
+        "fresh episodes %",
+        "steps to 5 %",
+        "seconds a run",
+    ):
         table.add_column(column, justify="left" if column in ("user", "method") else "right")
     for user, method in sorted({(row["user"], row["method"]) for row in rows}):
         arm = [row for row in rows if (row["user"], row["method"]) == (user, method)]

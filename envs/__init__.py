@@ -1,8 +1,10 @@
 """Multi-objective environments in pure JAX, by their MO-Gymnasium ids.
 
-`envs.make(id)` gives one, `envs.ids()` lists them, `envs.register` adds yours.
+`envs.make(id)` gives one, `envs.ids()` lists them, `envs.register` adds yours; `envs.make("module:id")` imports the
+module that does so.
 """
 
+import importlib
 from collections.abc import Callable
 from typing import Any
 
@@ -21,10 +23,19 @@ def register(id: str, factory: Callable[[], Environment[Any]]) -> None:
 
 
 def make(id: str) -> Environment[Any]:
-    """The environment called `id`. Raises ValueError, naming the known ids, if there is none."""
-    if id not in _registry:
-        raise ValueError(f"unknown environment {id!r}; known: {', '.join(ids())}")
-    return _registry[id]()
+    """The environment called `id`; `module:id` imports `module`, which registers it, first.
+
+    Raises ValueError, naming the module or the known ids, if there is none.
+    """
+    module, _, name = id.rpartition(":")
+    if module:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise ValueError(f"environment {id!r}: cannot import {module!r}: {error}") from error
+    if name not in _registry:
+        raise ValueError(f"unknown environment {name!r}; known: {', '.join(ids())}")
+    return _registry[name]()
 
 
 def ids() -> list[str]:

@@ -5,6 +5,7 @@ Exit codes: 0 done; 1 the run failed, what it had is kept; 2 bad input, nothing 
 
 import argparse
 import json
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -22,6 +23,7 @@ EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command. Returns the exit code; argparse itself exits with 2 for unknown flags."""
     options = _parser().parse_args(arguments)
+    sys.path.insert(0, os.getcwd())  # for an environment of one's own, as `--env my_module:my-env-v0`
     from jmorl.decision.records import ScriptError
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault

@@ -204,12 +204,11 @@ class _Run:
         """Select P tasks, train them, and take their offspring in."""
         state = replace(state, generation=state.generation + 1, silent_generations=max(state.silent_generations - 1, 0))
         started = time.perf_counter()
-        scale = self._scale(state)
         candidates = self._candidates(state)
-        tasks = self._select(state, candidates, scale)
+        tasks, predicted = self._select(state, candidates)
         lineage = Lineage(
             [candidates[task.candidate] for task in tasks],
-            scale.invert(np.stack([task.predicted for task in tasks])),
+            predicted,
             len(candidates),
             time.perf_counter() - started,
         )
@@ -249,9 +248,13 @@ class _Run:
         candidates = _within(state.buffer.members, state.bounds)
         return candidates if state.choice is None or state.choice in candidates else [state.choice, *candidates]
 
-    def _select(self, state: RunState, candidates: list[Policy], scale: Scale) -> list[Task]:
-        """The tasks whose predicted offspring improve the front most, in the interactive search within the bounds."""
+    def _select(self, state: RunState, candidates: list[Policy]) -> tuple[list[Task], np.ndarray]:
+        """The tasks whose predicted offspring improve the front most, and the predictions [P, M] in raw units.
+
+        In the interactive search only what lies within the bounds counts as an improvement.
+        """
         search = self.config.search
+        scale = self._scale(state)
         bounded = state.choice is not None and search.gain_within == "bounds"
         front = _within(state.archive.members, state.bounds) if bounded else state.archive.members
         if bounded:
@@ -260,13 +263,24 @@ class _Run:
             reference = np.full_like(state.bounds, -REFERENCE_MARGIN)
         else:
             reference = np.zeros_like(state.bounds)  # the scale's origin is the reference point
-        return select_tasks(
-            predict(scale.apply(values_of(candidates)), self.candidate_weights, state.records.scaled(scale)),
+        tasks = select_tasks(
+            scale.apply(self._predictions(state, candidates)),
             scale.apply(values_of(front)),
             reference,
             self.config.population.agents,
             search.sparsity_weight,
             np.random.default_rng([self.config.seed, state.generation]),
+        )
+        return tasks, scale.invert(np.stack([task.predicted for task in tasks]))
+
+    def _predictions(self, state: RunState, candidates: list[Policy]) -> np.ndarray:
+        """What each candidate is expected to become with each of the weights, [C, W, M] in raw units.
+
+        The model's constants are for values scaled by range, whatever scale the gains are measured in.
+        """
+        scale = search_scale(state.archive.values, state.bounds, _reference_point(state), "range")
+        return scale.invert(
+            predict(scale.apply(values_of(candidates)), self.candidate_weights, state.records.scaled(scale))
         )
 
     def _trained(

@@ -37,7 +37,7 @@ def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
     Another number of episodes is another compiled program: the last bits of a return may differ.
     """
     environment = envs.make(policy.header["environment"])
-    discount = policy.header["run"]["discount"]
+    discount = policy.header["discount"]
 
     def act(observation: jax.Array) -> tuple[jax.Array, jax.Array]:
         return policy.mean_action(observation, jnp), jnp.asarray(policy.log_std)

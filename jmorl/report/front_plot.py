@@ -12,7 +12,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from jmorl.decision.records import DecisionRecord
 from jmorl.report.labels import place_labels
-from jmorl.report.limits import box, core, hopeful, inside
+from jmorl.report.limits import around, core, hopeful, inside
 from jmorl.report.style import (
     BLUE,
     INK,
@@ -94,12 +94,12 @@ def choices_of(run: StoredRun) -> list[tuple[str, np.ndarray]]:
 def whole_view(run: StoredRun) -> np.ndarray:
     """Limits [2, M] around the whole search."""
     values = values_of(run.policies)
-    return box(np.concatenate([values[hopeful(values)], _close(run)]))
+    return around(np.concatenate([values[hopeful(values)], _close(run)]))
 
 
 def close_view(run: StoredRun) -> np.ndarray:
     """Limits [2, M] around the last front."""
-    return box(_close(run), margin=0.12)
+    return around(_close(run), margin=0.12)
 
 
 def note_outside(axes: Axes, values: np.ndarray, limits: np.ndarray) -> None:

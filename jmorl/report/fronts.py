@@ -5,11 +5,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import plotille
 from rich import box
+from rich.console import JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
 from envs.core import Objective
-from jmorl.report.limits import core
+from jmorl.report.limits import around, core, inside
 from jmorl.report.text import number_format, plural
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy, values_of
@@ -61,10 +62,12 @@ def front_scatter(
 ) -> Text:
     """The vectors as o and the marks as their characters, in plain text; for two objectives.
 
-    What is far out is left out, with a word about it, unless it is marked. `width` and `height` are in characters,
-    all included.
+    What is far out is left out, with a word about it, unless a mark is as far out. `width` and `height` are in
+    characters, all included.
     """
     near = core(values)
+    if not all(inside(point, around(values[near])) for point in marks.values()):
+        near[:] = True
     shown = np.stack([*values[near], *marks.values()])
     figure = plotille.Figure()
     figure.width = max(width - AXIS_COLUMNS - len(objectives[0].label), 1)
@@ -93,7 +96,8 @@ def plain_table(*headings: str, title: str | None = None) -> Table:
         pad_edge=False,
     )
     for heading in headings:
-        table.add_column(Text(heading, overflow="fold"), justify="right" if heading else "left", header_style="")
+        justify: JustifyMethod = "right" if heading else "left"
+        table.add_column(Text(heading), justify=justify, header_style="", overflow="fold")
     return table
 
 

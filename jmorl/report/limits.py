@@ -26,7 +26,7 @@ def hopeful(values: np.ndarray) -> np.ndarray:
     return (values >= low - 3 * (best - low)).all(axis=1)
 
 
-def box(values: np.ndarray, margin: float = 0.06) -> np.ndarray:
+def around(values: np.ndarray, margin: float = 0.06) -> np.ndarray:
     """The limits of axes around the vectors [N, M], with a share of their extent as margin: lows and highs [2, M]."""
     low, high = values.min(axis=0), values.max(axis=0)
     extent = np.where(high > low, high - low, np.where(high == 0, 1.0, 0.1 * np.abs(high)))

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
-from jmorl.report.limits import box, core, inside
+from jmorl.report.limits import around, core, inside
 from jmorl.report.style import (
     BLUE,
     GREEN,
@@ -110,7 +110,7 @@ def _focus(axes: Axes) -> None:
     """Limits around most of each line, so that a bad start does not hide what comes later."""
     lines = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
     points = [line[~np.isnan(line), None] for line in lines]
-    low, high = box(np.concatenate([line[core(line)] for line in points])).ravel()
+    low, high = around(np.concatenate([line[core(line)] for line in points])).ravel()
     axes.set_ylim(low, high)
     outside = sum(int((line < low).sum()) for line in points)
     if outside:
@@ -128,7 +128,7 @@ def _choice_steps(run: StoredRun) -> list[float]:
 
 def _draw_prediction(axes: Axes, objective: Objective, pairs: np.ndarray, colours: list[Colour]) -> None:
     """Predicted and realised changes [N, 2] of one objective, and how far the ones are from the others."""
-    low, high = box(np.append(pairs[core(pairs)].ravel(), 0.0)[:, None]).ravel()
+    low, high = around(np.append(pairs[core(pairs)].ravel(), 0.0)[:, None]).ravel()
     predicted, realised = pairs.T
     axes.plot([low, high], [low, high], color=INK, linewidth=0.9, zorder=1)
     axes.axhline(0, color=PALE, linewidth=0.8, zorder=0.5)

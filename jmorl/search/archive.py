@@ -33,13 +33,6 @@ class Archive:
         kept = non_dominated(values_of(union))
         return Archive(tuple(policy for policy, stays in zip(union, kept, strict=True) if stays))
 
-    def by_id(self, policy_id: int) -> Policy:
-        """The member with this id. Raises KeyError if there is none."""
-        for policy in self.members:
-            if policy.id == policy_id:
-                return policy
-        raise KeyError(f"policy {policy_id} is not in the archive; its members are {[p.id for p in self.members]}")
-
 
 def refuse_unusable(policies: Sequence[Policy]) -> None:
     """Raise ValueError, naming the policy, if its values are not one finite number per objective.

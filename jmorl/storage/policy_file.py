@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from envs.core import Environment
+from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
 from jmorl.search.policy import Policy
 from jmorl.storage.files import written_whole
@@ -49,13 +50,13 @@ class StoredPolicy:
         return x @ kernel + bias
 
 
-def save_policy(path: Path, policy: Policy, environment: Environment[Any], run: dict[str, Any]) -> None:
-    """Write a policy whose snapshot is a `Learner`. `run` is noted in the header as its provenance."""
+def save_policy(path: Path, policy: Policy, environment: Environment[Any], config: Config) -> None:
+    """Write a policy whose snapshot is a `Learner`, with the run it comes from noted in the header."""
     parameters = policy.snapshot.parameters["actor"]["params"]
     layers = [parameters["MLP_0"][f"Dense_{index}"] for index in range(len(parameters["MLP_0"]))]
     header = {
         "format": FORMAT,
-        "environment": environment.id,
+        "environment": config.env,
         "objectives": [vars(objective) for objective in environment.objectives],
         "action_limits": [environment.action_low, environment.action_high],
         "id": policy.id,
@@ -65,7 +66,9 @@ def save_policy(path: Path, policy: Policy, environment: Environment[Any], run: 
         "values": policy.values.tolist(),
         "spread": policy.spread.tolist(),
         "discounted": policy.discounted.tolist(),
-        "run": run,
+        "evaluation_episodes": config.evaluation.episodes,
+        "discount": config.ppo.discount,
+        "run": {"config": config.digest(), "method": config.method, "seed": config.seed},
     }
     statistics = policy.snapshot.observation_statistics
     arrays = {

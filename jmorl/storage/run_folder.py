@@ -47,13 +47,7 @@ class RunFolder:
     def __init__(self, path: Path, config: Config, environment: Environment[Any]):
         self.path = path
         self.environment = environment
-        self.provenance = {
-            "config": config.digest(),
-            "seed": config.seed,
-            "method": config.method,
-            "discount": config.ppo.discount,
-            "evaluation_episodes": config.evaluation.episodes,
-        }
+        self.config = config
 
     @classmethod
     def create(cls, path: Path, config: Config, environment: Environment[Any], force: bool = False) -> "RunFolder":
@@ -88,7 +82,7 @@ class RunFolder:
     def _record_generation(self, event: GenerationFinished) -> None:
         for policy in event.offspring:
             if policy in event.state.archive.members:
-                save_policy(self.policy_path(policy.id), policy, self.environment, self.provenance)
+                save_policy(self.policy_path(policy.id), policy, self.environment, self.config)
         _append_rows(self.path / "policies.csv", [self._policy_row(policy) for policy in event.offspring])
         _append_rows(self.path / "metrics.csv", [self._metrics_row(event)])
         _write_rows(self.path / "front.csv", [self._policy_row(policy) for policy in event.state.archive.members])

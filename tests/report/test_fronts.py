@@ -46,9 +46,12 @@ def test_a_row_says_all_about_a_policy():
 
 
 def test_numbers_stand_under_each_other():
-    lines = printed(front_table(policies([[-1.0, -5], [-100, -4]], spread=12.5), OBJECTIVES)).splitlines()[3:]
-    assert lines[0].index("±") == lines[1].index("±")
-    assert lines[0].index("-1 ") + 1 == lines[1].index("-100 ") + 3
+    one, other = front_table(policies([[-1.5, -5], [-100, -4]]), OBJECTIVES), policies([[-1.5, -5], [-100, -4]], 12.5)
+    for table in (one, front_table([policies([[-1.5, -5]])[0], other[1]], OBJECTIVES)):
+        lines = printed(table).splitlines()[3:]
+        for text in (("-1.5", "-100.0"), ("-5.00", "-4.00")):
+            ends = [line.index(number) + len(number) for line, number in zip(lines, text, strict=True)]
+            assert ends[0] == ends[1]
 
 
 def test_policies_outside_the_bounds_are_dim():
@@ -71,23 +74,22 @@ def test_a_plot_keeps_to_its_size_in_plain_characters(width, label):
 
 def test_a_plot_has_its_points_where_they_belong():
     text = front_scatter(OBJECTIVES, VALUES, {"x": VALUES[0]}, 60, 16).plain
-    marks = {
-        (column, line)
-        for line, content in enumerate(text.split("\n")[:12])
+    marks = [
+        (column, line, character)
+        for line, content in enumerate(text.split("\n")[1:-3])
         for column, character in enumerate(content[13:])
         if character in "ox"
-    }
-    by_time = sorted(marks)
-    assert len(by_time) == 3
-    # The front falls from the left to the right, where lines are counted from the top.
-    assert [line for _, line in by_time] == sorted(line for _, line in marks)
-    assert text.count("x") == 1
+    ]
+    # The front falls from the left to the right; lines are counted from the top.
+    assert [character for _, _, character in sorted(marks)] == ["o", "x", "o"]
+    assert [line for _, line, _ in sorted(marks)] == sorted(line for _, line, _ in marks)
 
 
 def test_a_plot_leaves_out_what_is_far_out_unless_it_is_marked():
     values = np.array([[-70.0, -40], [-72, -39], [-75, -38], [-77, -37], [-80, -36], [-999, 0]])
     near = front_scatter(OBJECTIVES, values, {}, 70, 18).plain
-    assert near.count("o") == 5 and "(1 policy far out)" in near and "-999" not in near
+    assert "\n(1 policy far out)" in near
+    assert near.split("\n-----")[0].count("o") == 5
     marked = front_scatter(OBJECTIVES, values, {"x": values[5]}, 70, 18).plain
-    assert marked.count("x") == 1
+    assert marked.count("x") == 1 and "far out" not in marked
     assert min(float(word) for word in marked.split("\n")[-2].replace("|", "").split()) < -900

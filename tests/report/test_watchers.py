@@ -3,6 +3,7 @@
 import io
 import json
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,10 +46,15 @@ def test_there_is_a_line_for_every_event_and_the_result_as_a_table(make_events):
 
 def test_a_choice_is_said_with_values_and_bounds(make_events):
     events = make_events()
-    text = shown("lines", events)
-    assert "choice for generation 10: policy 58 (time -91.7, fuel -38.9) of 5 shown; bounds time ≥ " in text
-    time, fuel = next(event.bounds for event in reversed(events[:-2]) if hasattr(event, "bounds"))
-    assert f"bounds time ≥ {time:.1f}, fuel ≥ {fuel:.1f}" in text
+    decided = events[2]
+    time, fuel = decided.bounds
+    words = "policy 2 (time -201, fuel -91.29) of 4 shown"
+    bounds = f"bounds time ≥ {time:.0f}, fuel ≥ {fuel:.2f}"
+    assert f"choice for generation 1: {words}; {bounds}\n" in shown("lines", [decided])
+    for_long = replace(decided, answer=replace(decided.answer, generations=3))
+    assert f"{words}; {bounds}, no question for 3 generations\n" in shown("lines", [for_long])
+    enough = replace(decided, answer=replace(decided.answer, stop=True))
+    assert f"{words}, and stop\n" in shown("lines", [enough])
 
 
 def test_a_person_without_utility_gets_no_utility(make_events):
@@ -124,7 +130,7 @@ def test_a_live_view_tells_where_the_run_stands(make_events):
     # A generation took 10.1 seconds; the second of ten is going on.
     for fact in (
         "generation 2 of 10",
-        "541 k of 2.64 M steps",
+        "542 k of 2.64 M steps",
         "next question  in 7.5 s",
         "end            in about 1 min 28 s",
         "speed          23.6 k steps/s",

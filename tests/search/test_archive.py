@@ -91,10 +91,3 @@ def test_the_wrong_number_of_values_is_refused_by_name(values: list[float]) -> N
         Archive().offer([policy(17, values, objectives=2)])
     with pytest.raises(ValueError, match="policy 17 "):
         Archive().offer(policies([[1.0, 2.0]])).offer([policy(17, values)])
-
-
-def test_lookup_by_id() -> None:
-    archive = Archive().offer(policies([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0]], first_id=7))
-    assert archive.by_id(8) is archive.members[1]
-    with pytest.raises(KeyError, match=r"policy 3 is not in the archive; its members are \[7, 8\]"):
-        archive.by_id(3)

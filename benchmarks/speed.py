@@ -1,0 +1,234 @@
+"""Speed and memory on MountainCar, printed and written to `benchmarks/speed.json`.
+
+    python -m benchmarks.speed              everything, beside morl-baselines' PGMORL in the same run (10 minutes)
+    python -m benchmarks.speed --no-peer    without it
+
+Compilation is timed apart from steady state, and every rate is of whole generations: training, evaluation and
+selection. The peer runs in an environment of its own, `.venv-peer`, which is made the first time (gigabytes).
+"""
+
+import argparse
+import json
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import envs
+from jmorl.config import Config, resolve
+from jmorl.learning.devices import use_all_cpu_cores
+from jmorl.learning.population import Population
+from jmorl.run import Compiled, GenerationFinished, evaluation_keys, run
+from jmorl.search.prediction import Records, predict
+from jmorl.search.selection import select_tasks
+from jmorl.search.weights import simplex_grid, spread_weights
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+RESULT = HERE / "speed.json"
+PEER_PYTHON = ROOT / ".venv-peer" / "bin" / "python"
+ENVIRONMENT = "mo-mountaincarcontinuous-v0"
+REPEATS = 3
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--no-peer", action="store_true", help="without morl-baselines")
+    parser.add_argument("--generations", type=int, default=5, help="of the measured run (default: 5)")
+    options = parser.parse_args()
+    use_all_cpu_cores()
+    console = Console()
+    report: dict[str, Any] = {"machine": machine(), "run": whole_run(options.generations)}
+    report["parts"] = parts()
+    report["selection"] = [selection(candidates) for candidates in (10, 100, 400)]
+    report["scaling"] = scaling()
+    if not options.no_peer:
+        report["peer"] = peer()
+        rate = report["peer"]["all_generations"]["steps_per_second"]
+        report["times_the_peer"] = round(report["run"]["steps_per_second"] / rate, 1)
+    for table in tables(report):
+        console.print(table)
+    RESULT.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+def machine() -> dict[str, Any]:
+    """What it was measured on."""
+    device = jax.devices()[0]
+    return {
+        "cpu": _cpu_name(),
+        "cores": len(os.sched_getaffinity(0)),
+        "device": f"{jax.device_count()} x {device.device_kind}",
+        "jax": jax.__version__,
+        "load_before": round(os.getloadavg()[0], 2),
+    }
+
+
+def whole_run(generations: int) -> dict[str, Any]:
+    """A PGMORL run at the paper's sizes: the median generation, and where its time goes."""
+    config = resolve("paper", None, {"env": ENVIRONMENT, "method": "pgmorl"})
+    iterations = config.population.warmup_iterations + (generations - 1) * config.population.iterations + 1
+    config = config.replace(steps=iterations * config.steps_per_iteration)
+    finished = []
+    for event in run(config):
+        if isinstance(event, Compiled):
+            compile_seconds = event.seconds
+        elif isinstance(event, GenerationFinished) and event.state.generation:
+            finished.append(event)
+    median = {
+        part: statistics.median(getattr(event.seconds, part) for event in finished)
+        for part in ("select", "train", "evaluate", "total")
+    }
+    return {
+        "compile_seconds": round(compile_seconds, 2),
+        "steps_per_second": round(statistics.median(event.steps_per_second for event in finished)),
+        "slowest_and_fastest": [round(f(event.steps_per_second for event in finished)) for f in (min, max)],
+        **{f"{part}_seconds": round(seconds, 4) for part, seconds in median.items()},
+        **{f"{part}_share": round(median[part] / median["total"], 4) for part in ("select", "train", "evaluate")},
+        "evaluation_steps_per_second": round(_evaluated_steps(finished) / median["evaluate"]),
+        "peak_memory_mib": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+    }
+
+
+def _evaluated_steps(finished: list[GenerationFinished]) -> float:
+    """Environment steps of the median evaluation, up to the end of each episode."""
+    counts = np.diff([event.state.evaluation_steps for event in finished])
+    return float(np.median(counts))
+
+
+def parts() -> dict[str, Any]:
+    """The environment alone, with random actions, all of a population's environments on one device."""
+    environment = envs.make(ENVIRONMENT)
+    count, steps = 24, 1000
+
+    @jax.jit
+    def play(key: jax.Array) -> jax.Array:
+        states, _ = jax.vmap(environment.reset)(jax.random.split(key, count))
+        keys = jax.random.split(key, (steps, count))
+        actions = jax.random.uniform(key, (steps, count, environment.action_size), minval=-1.0)
+
+        def act(states: Any, inputs: Any) -> Any:
+            states, step = jax.vmap(environment.step)(inputs[0], states, inputs[1])
+            return states, step.reward
+
+        return jax.lax.scan(act, states, (keys, actions))[1].sum()
+
+    seconds = _median_seconds(lambda: play(jax.random.key(0)))
+    return {"environments": count, "environment_steps_per_second": round(count * steps / seconds)}
+
+
+def selection(candidates: int) -> dict[str, Any]:
+    """Prediction and task selection for so many candidates, 11 weights, 66 records and 6 tasks."""
+    generator = np.random.default_rng(0)
+    angles = generator.uniform(0, np.pi / 2, candidates)
+    values = np.stack([np.cos(angles), np.sin(angles)], axis=1) * generator.uniform(0.7, 1.0, (candidates, 1))
+    weights = simplex_grid(2, 10)
+    parents, used = values[generator.integers(candidates, size=66)], weights[generator.integers(11, size=66)]
+    records = Records(parents, used, parents + 0.1 * (used - 0.3) + generator.normal(0, 0.02, parents.shape))
+
+    def select() -> None:
+        predictions = predict(values, weights, records)
+        select_tasks(predictions, values, np.full(2, -0.1), 6, 1.0, np.random.default_rng(0))
+
+    return {"candidates": candidates, "seconds": round(_median_seconds(select), 4)}
+
+
+def scaling() -> list[dict[str, Any]]:
+    """What an agent, and an environment, costs in an iteration as there are more of them."""
+    rows = []
+    for agents, environments in ((6, 4), (24, 4), (96, 4), (6, 64)):
+        config = resolve("paper", None, {"env": ENVIRONMENT}).replace(
+            population={"agents": agents}, ppo={"environments": environments}, steps=10**9
+        )
+        seconds = _iteration_seconds(config, iterations=2)
+        rows.append(
+            {
+                "agents": agents,
+                "environments": environments,
+                "iteration_seconds": round(seconds, 3),
+                "milliseconds_per_agent": round(1e3 * seconds / agents, 2),
+                "microseconds_per_step": round(1e6 * seconds / config.steps_per_iteration, 2),
+            }
+        )
+    return rows
+
+
+def _iteration_seconds(config: Config, iterations: int) -> float:
+    """One training iteration of the whole population."""
+    population = Population(envs.make(config.env), config)
+    population.compile(evaluation_keys(config))
+    learners = population.initialize(jax.random.key(0))
+    weights = spread_weights(2, config.population.agents)
+    train: Callable[[], Any] = lambda: population.train(learners, weights, jax.random.key(1), iterations)  # noqa: E731
+    return _median_seconds(train) / iterations
+
+
+def _median_seconds(call: Callable[[], Any]) -> float:
+    """Of three calls, after one that is not counted."""
+    jax.block_until_ready(call())
+    seconds = []
+    for _ in range(REPEATS):
+        started = time.perf_counter()
+        jax.block_until_ready(call())
+        seconds.append(time.perf_counter() - started)
+    return statistics.median(seconds)
+
+
+def peer() -> dict[str, Any]:
+    """morl-baselines' PGMORL with the same sizes, on the same machine, now: one short warm-up and one generation."""
+    if not PEER_PYTHON.exists():
+        subprocess.run([sys.executable, "-m", "venv", PEER_PYTHON.parents[1]], check=True)
+        install = [PEER_PYTHON, "-m", "pip", "install", "--quiet", "-r", HERE / "peer" / "requirements.txt"]
+        subprocess.run(install, check=True)
+    command = [PEER_PYTHON, HERE / "peer" / "pgmorl.py", "--env", ENVIRONMENT]
+    result: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    return result
+
+
+def _cpu_name() -> str:
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def tables(report: dict[str, Any]) -> list[Table]:
+    """The report for people."""
+    whole = report["run"]
+    rows = [
+        ("whole generation", f"{whole['steps_per_second']:,} steps/s", f"{whole['total_seconds']:.2f} s"),
+        ("- training", f"{whole['train_share']:.1%}", f"{whole['train_seconds']:.2f} s"),
+        ("- evaluation", f"{whole['evaluate_share']:.1%}", f"{whole['evaluate_seconds']:.3f} s"),
+        ("- selection", f"{whole['select_share']:.1%}", f"{whole['select_seconds']:.3f} s"),
+        ("compilation, once a run", "", f"{whole['compile_seconds']:.1f} s"),
+        ("peak memory", f"{whole['peak_memory_mib']:,} MiB", ""),
+        ("environment alone, 1 device", f"{report['parts']['environment_steps_per_second']:,} steps/s", ""),
+        *((f"selection, {row['candidates']} candidates", "", f"{row['seconds']:.3f} s") for row in report["selection"]),
+    ]
+    if "peer" in report:
+        generations = report["peer"]["all_generations"]
+        rows.append(("morl-baselines, whole generation", f"{generations['steps_per_second']:,.0f} steps/s", ""))
+        rows.append(("times as fast", f"{report['times_the_peer']:.1f}", ""))
+    speed = Table("", "rate or share", "time", title=f"{ENVIRONMENT}, paper sizes, {report['machine']['device']}")
+    for row in rows:
+        speed.add_row(*row)
+    cost = Table("agents", "environments", "ms per agent", "µs per step", title="One training iteration")
+    for row in report["scaling"]:
+        fields = ("agents", "environments", "milliseconds_per_agent", "microseconds_per_step")
+        cost.add_row(*(str(row[field]) for field in fields))
+    return [speed, cost]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,46 @@
+"""The registry, and the README's environment as its reader would write it."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import envs
+import pytest
+from envs.mountain_car import MountainCar
+
+JMORL = Path(sys.executable).with_name("jmorl")
+README = Path(__file__).parents[2] / "README.md"
+
+
+def test_an_unknown_environment_names_the_known_ones():
+    with pytest.raises(ValueError, match="unknown environment 'mo-nowhere-v0'; known: .*mo-mountaincarcontinuous-v0"):
+        envs.make("mo-nowhere-v0")
+
+
+def test_a_module_that_is_not_there_is_named():
+    with pytest.raises(ValueError, match="environment 'no_such_module:x': cannot import 'no_such_module'"):
+        envs.make("no_such_module:x")
+
+
+def test_an_id_is_taken_once():
+    envs.register(MountainCar.id, MountainCar)  # the same again is fine
+    with pytest.raises(ValueError, match="already registered"):
+        envs.register(MountainCar.id, lambda: MountainCar())
+
+
+def test_the_readmes_environment_trains_from_the_command_line(tmp_path):
+    (source,) = re.findall(r"```python\n(# my_envs.py\n.*?)```", README.read_text(), re.DOTALL)
+    (tmp_path / "my_envs.py").write_text(source)
+    sizes = ["--population.agents", "2", "--population.warmup-iterations", "1", "--population.iterations", "1"]
+    sizes += ["--ppo.environments", "2", "--ppo.rollout-steps", "64", "--evaluation.episodes", "2", "--steps", "512"]
+    command = [JMORL, "train", "--env", "my_envs:harbour-v0", "--out", "run", *sizes]
+    finished = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert finished.returncode == 0, finished.stderr
+    assert (tmp_path / "run" / "chosen.npz").exists()
+    show = [JMORL, "show", "run"]
+    shown = subprocess.run(show, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert shown.returncode == 0 and "rudder" in shown.stdout, shown.stderr
+    evaluate = [JMORL, "evaluate", "run", "--episodes", "3"]
+    evaluated = subprocess.run(evaluate, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert evaluated.returncode == 0, evaluated.stderr
