@@ -2,10 +2,34 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
+
+
+def orthogonal(gain: float) -> nn.initializers.Initializer:
+    """Kernels [in, out] with orthonormal rows or columns, whichever are fewer, times `gain` (Saxe et al. 2014).
+
+    By Gram-Schmidt, which takes no LAPACK: on a CPU, JAX 0.10's QR decomposition hangs once in some hundred calls
+    of a compiled program that has several, and takes seconds to compile.
+    """
+
+    def initialize(key: jax.Array, shape: Sequence[int], dtype: Any = jnp.float32) -> jax.Array:
+        few, many = sorted(shape)
+        vectors = jax.random.normal(key, (few, many), dtype)
+
+        def add(basis: jax.Array, index: jax.Array) -> tuple[jax.Array, None]:
+            vector = vectors[index]
+            for _ in range(2):  # once more, against what rounding left over
+                vector = vector - basis.T @ (basis @ vector)
+            return basis.at[index].set(vector / jnp.linalg.norm(vector)), None
+
+        basis, _ = jax.lax.scan(add, jnp.zeros((few, many), dtype), jnp.arange(few))
+        return gain * (basis if shape[0] == few else basis.T)
+
+    return initialize
 
 
 class MLP(nn.Module):
@@ -18,8 +42,8 @@ class MLP(nn.Module):
     @nn.compact
     def __call__(self, x: jax.Array) -> jax.Array:  # [..., O] -> [..., output_size]
         for size in self.hidden_sizes:
-            x = nn.tanh(nn.Dense(size, kernel_init=nn.initializers.orthogonal(math.sqrt(2)))(x))
-        return nn.Dense(self.output_size, kernel_init=nn.initializers.orthogonal(self.output_gain))(x)
+            x = nn.tanh(nn.Dense(size, kernel_init=orthogonal(math.sqrt(2)))(x))
+        return nn.Dense(self.output_size, kernel_init=orthogonal(self.output_gain))(x)
 
 
 class Actor(nn.Module):

@@ -124,6 +124,7 @@ def legend_of(run: StoredRun, choice: str, without: Container[str] = ()) -> list
     entries["front"] = Line2D([], [], color=late, marker="o", markeredgecolor="white", label=front_name(run))
     if choices_of(run):
         entries["choice"] = Line2D([], [], label=choice, **RING)
+    if np.isfinite(run.bounds).all(axis=1).any():
         entries["bounds"] = Line2D([], [], label="bounds of a choice", **BOUNDS_LINE)
     if np.isfinite(run.bounds[-1]).all():
         entries["bounds area"] = Patch(label="within the last bounds", **BOUNDS_AREA)

@@ -3,6 +3,7 @@
 import numpy as np
 
 FEW = 5  # values whose spread says nothing
+TINY = 1e-300  # too near to 0 to calculate with
 
 
 def core(values: np.ndarray) -> np.ndarray:
@@ -29,7 +30,9 @@ def hopeful(values: np.ndarray) -> np.ndarray:
 def around(values: np.ndarray, margin: float = 0.06) -> np.ndarray:
     """The limits of axes around the vectors [N, M], with a share of their extent as margin: lows and highs [2, M]."""
     low, high = values.min(axis=0), values.max(axis=0)
-    extent = np.where(high > low, high - low, np.where(high == 0, 1.0, 0.1 * np.abs(high)))
+    size = np.maximum(np.abs(low), np.abs(high))
+    without_range = np.where(size > TINY, 0.1 * size, 1.0)
+    extent = np.where(high - low > 1e-9 * size, high - low, without_range)
     return np.stack([low - margin * extent, high + margin * extent])
 
 

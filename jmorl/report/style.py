@@ -108,4 +108,4 @@ def note(axes: Axes, text: str) -> None:
 def _generations(last: int) -> ScalarMappable:
     viridis = matplotlib.colormaps["viridis_r"]
     without_yellow = ListedColormap(viridis(np.linspace(0.12, 1.0, 256)))  # hard to see on white
-    return ScalarMappable(Normalize(0, max(last, 1)), without_yellow)
+    return ScalarMappable(Normalize(min(last - 1, 0), last), without_yellow)
