@@ -123,7 +123,7 @@ def _evaluate(options: argparse.Namespace) -> None:
     import jax
     from rich.console import Console
 
-    from jmorl.report.listings import evaluation_table
+    from jmorl.report.tables import evaluation_table
     from jmorl.scoring import evaluate_stored
     from jmorl.storage.policy_file import load_policy
 
@@ -140,7 +140,7 @@ def _evaluate(options: argparse.Namespace) -> None:
 def _enautilus(options: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from jmorl.report.fronts import front_table
+    from jmorl.display.fronts import front_table
     from jmorl.storage.afterwards import choose_afterwards
     from jmorl.storage.stored_run import read_run
 
@@ -171,7 +171,7 @@ def _show(options: argparse.Namespace) -> None:
 def _envs(options: argparse.Namespace) -> None:
     from rich.console import Console
 
-    from jmorl.report.listings import environments_table
+    from jmorl.report.tables import environments_table
 
     Console().print(environments_table())
 

@@ -11,7 +11,8 @@ ROOT = Path(__file__).parent.parent
 MAY_IMPORT = {
     "envs": {"jax"},
     "jmorl.search": set(),
-    "jmorl.decision": {"envs", "jmorl.search"},
+    "jmorl.display": {"envs", "jmorl.search"},
+    "jmorl.decision": {"envs", "jmorl.display", "jmorl.search"},
     "jmorl.config": {"envs", "jmorl.decision"},
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
@@ -22,7 +23,8 @@ MAY_IMPORT = {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search")
     },
     "jmorl.report": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search", "jmorl.storage")
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.run"),
+        *("jmorl.search", "jmorl.storage"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}

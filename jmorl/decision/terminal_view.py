@@ -8,8 +8,8 @@ from rich.table import Table
 
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion, Question
-from jmorl.report.fronts import front_scatter, front_table, plain_table, stacked_label
-from jmorl.report.text import number_format, plural
+from jmorl.display.fronts import front_scatter, front_table, plain_table, stacked_label
+from jmorl.display.text import number_format, plural
 
 PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 

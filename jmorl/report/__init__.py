@@ -1,1 +1,1 @@
-"""What people see of a run: its front, its tables, its progress while it lasts, and its plots."""
+"""What people see of a run: its progress while it lasts, its tables, and its plots."""

@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from jmorl.decision.records import DecisionRecord
+from jmorl.display.limits import around, core, hopeful, inside
+from jmorl.display.text import plural
 from jmorl.report.labels import place_labels
-from jmorl.report.limits import around, core, hopeful, inside
 from jmorl.report.style import (
     BLUE,
     INK,
@@ -25,7 +26,6 @@ from jmorl.report.style import (
     new_figure,
     note,
 )
-from jmorl.report.text import plural
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import values_of
 from jmorl.storage.stored_run import StoredRun

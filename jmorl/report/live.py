@@ -15,8 +15,8 @@ from rich.text import Text
 
 from envs.core import Objective
 from jmorl.config import Config
-from jmorl.report.fronts import front_scatter, front_table
-from jmorl.report.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.display.fronts import front_scatter, front_table
+from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
 from jmorl.report.timeline import Timeline
 from jmorl.report.watchers import Watcher, show_result
 from jmorl.run import Event, RunFinished
@@ -24,7 +24,7 @@ from jmorl.search.policy import values_of
 
 REFRESH_RATE = 4  # per second; a frame takes a few milliseconds
 WIDTH = 100  # columns of the panel at most
-FACT_LINES = 12  # of the screen that are not for the front
+FACT_LINES = 13  # of the screen that are not for the front
 PLOT_LINES = 18  # of the front at most
 LEAST_LINES = 9  # less is no plot
 
@@ -69,7 +69,7 @@ class LiveView(Watcher):
         timeline, now = self.timeline, self.clock()
         parts: list[RenderableType] = [self._bar(timeline, now), self._facts(timeline, now)]
         if timeline.finished and (len(self.objectives) == 2 or not timeline.result):
-            parts += ["", self._front(timeline)]  # at the end of a run the table of the result is there anyway
+            parts += self._front(timeline)  # at the end of a run the table of the result is there anyway
         config = self.config
         title = f"{config.method} · {config.env} · user {config.user} · seed {config.seed}"
         return Panel(Group(*parts), title=Text(title), title_align="left", width=min(self.console.width, WIDTH))
@@ -114,19 +114,19 @@ class LiveView(Watcher):
             if np.isfinite(decided.bounds).any():
                 yield "bounds", values_in_words(decided.bounds, self.objectives, formats, "≥ ")
 
-    def _front(self, timeline: Timeline) -> RenderableType:
-        """The front as a plot of two objectives, or as the first lines of a table of more."""
+    def _front(self, timeline: Timeline) -> list[RenderableType]:
+        """The front as a plot of two objectives, or as a table of more, if there is room."""
         assert timeline.finished is not None
         members = timeline.finished.state.archive.members
         lines = min(self.console.height - FACT_LINES, PLOT_LINES)
         chosen = timeline.decided.chosen if timeline.decided else None
         if lines < LEAST_LINES:
-            return ""
-        if len(self.objectives) == 2:
-            marks = {"x": chosen.values} if chosen else {}
-            plot = front_scatter(self.objectives, values_of(members), marks, min(self.console.width, WIDTH) - 4, lines)
-            return plot
-        return front_table(members, self.objectives, previous_id=chosen.id if chosen else None)
+            return []
+        if len(self.objectives) > 2:
+            return ["", front_table(members, self.objectives, previous_id=chosen.id if chosen else None)]
+        marks, legend = ({"x": chosen.values}, "o: the front, x: the last choice") if chosen else ({}, "o: the front")
+        plot = front_scatter(self.objectives, values_of(members), marks, min(self.console.width, WIDTH) - 4, lines)
+        return ["", plot, Text(legend, "dim")]
 
 
 def _phase(timeline: Timeline) -> str:

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from jmorl.display.text import number_format, objective_label
 from jmorl.report.front_plot import close_view, draw_policies, front_name, legend_of, note_outside
 from jmorl.report.style import BLUE, INK, RED, generation_bar, generation_colour, legend_below, new_figure
-from jmorl.report.text import number_format, objective_label
 from jmorl.search.policy import values_of
 from jmorl.storage.stored_run import StoredRun
 

@@ -9,7 +9,8 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
-from jmorl.report.limits import around, core, inside
+from jmorl.display.limits import around, core, inside
+from jmorl.display.text import objective_label, plural, short_count
 from jmorl.report.style import (
     BLUE,
     GREEN,
@@ -23,7 +24,6 @@ from jmorl.report.style import (
     new_figure,
     note,
 )
-from jmorl.report.text import objective_label, plural, short_count
 from jmorl.storage.stored_run import StoredRun
 
 BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
@@ -81,7 +81,7 @@ def _draw_utility(axes: Axes, run: StoredRun) -> None:
     _line(axes, steps, metrics["utility_mean"], "mean of the buffer", BLUE)
     if not np.isnan(metrics["utility_mean_within_bounds"]).all():
         _line(axes, steps, metrics["utility_mean_within_bounds"], "mean of the buffer\nwithin the bounds", BLUE, "--")
-    axes.set_ylabel(f"utility of user {run.config.user}")
+    axes.set_ylabel("utility")
     axes.legend(**BESIDE)
     _focus(axes)
 

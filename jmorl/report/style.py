@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from envs.core import Objective
-from jmorl.report.text import objective_label
+from jmorl.display.text import objective_label
 from jmorl.storage.files import written_whole
 
 DOTS_PER_INCH = 150

@@ -11,9 +11,9 @@ from rich.text import Text
 import envs
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
+from jmorl.display.fronts import front_table, plain_table, stacked_label
+from jmorl.display.text import REASONS, duration, number_format, objective_label, plural, short_count
 from jmorl.learning.rollout import EpisodeReturns
-from jmorl.report.fronts import front_table, plain_table, stacked_label
-from jmorl.report.text import REASONS, duration, number_format, objective_label, plural, short_count
 from jmorl.search.policy import values_of
 from jmorl.storage.stored_run import StoredRun
 
@@ -54,7 +54,10 @@ def run_seconds(run: StoredRun) -> float:
 
 
 def metrics_table(run: StoredRun) -> Table:
-    """One row for each generation; what all generations lack, as a utility for a person, has no column."""
+    """One row for each generation; what all generations lack, as a utility for a person, has no column.
+
+    The model error is that of the predictions, in units of the archive's range.
+    """
     metrics = run.metrics
     seconds = metrics["select_seconds"] + metrics["train_seconds"] + metrics["evaluate_seconds"]
     utility_max, utility_mean = metrics["utility_max"], metrics["utility_mean"]
@@ -68,7 +71,7 @@ def metrics_table(run: StoredRun) -> Table:
         "utility\nmax": _texts(utility_max, utility_format),
         "utility\nmean": _texts(utility_mean, utility_format),
         "candi-\ndates": _texts(np.where(metrics["generation"] > 0, metrics["candidates"], np.nan), ".0f"),
-        "predict.\nerror": _texts(metrics["prediction_error"], ".1%"),
+        "model\nerror": _texts(metrics["prediction_error"], ".1%"),
         "time\nin s": _texts(seconds, ".1f"),
     }
     present = {heading: cells for heading, cells in columns.items() if any(cells)}
@@ -96,15 +99,20 @@ def decisions_table(run: StoredRun) -> Table:
 def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Table:
     """What fresh episodes [N] of a stored policy with this header brought, beside its score in the run."""
     undiscounted = np.asarray(returns.undiscounted, float)
-    table = plain_table("objective", "mean", "", "worst", "best", "in the run", "discounted")
+    spread = "std.\nerror", "std.\ndev.", "\nworst", "\nbest"
+    table = plain_table("\nobjective", "\nmean", *spread, "in its\nrun", "dis-\ncounted")
     table.title = f"Policy {header['id']} in {plural(len(undiscounted), 'fresh episode')} of {header['environment']}"
     for index, fields in enumerate(header["objectives"]):
         column = undiscounted[:, index]
         fmt = number_format(column)
-        numbers = (column.min(), column.max(), header["values"][index], np.mean(returns.discounted[:, index]))
+        error = f"{column.std(ddof=1) / np.sqrt(len(column)):.2g}" if len(column) > 1 else ""
+        discounted = np.mean(returns.discounted[:, index])
+        numbers = column.std(), column.min(), column.max(), header["values"][index], discounted
         texts = [f"{value:{fmt}}" for value in numbers]
-        label = objective_label(Objective(**fields))
-        table.add_row(label, f"{column.mean():{fmt}}", f"±{column.std():{fmt}}", *texts)
+        table.add_row(objective_label(Objective(**fields)), f"{column.mean():{fmt}}", error, *texts)
+    lengths = np.asarray(returns.length)
+    table.caption = f"Episodes of {lengths.min()} to {lengths.max()} steps, {lengths.mean():.1f} on average."
+    table.caption_justify = "left"
     return table
 
 

@@ -12,8 +12,8 @@ from rich.console import Console
 
 from envs.core import Objective
 from jmorl.config import Config
-from jmorl.report.fronts import front_table
-from jmorl.report.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.display.fronts import front_table
+from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
 from jmorl.report.timeline import Timeline
 from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished
 from jmorl.search.policy import Policy

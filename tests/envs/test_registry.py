@@ -5,8 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import envs
 import pytest
+
+import envs
 from envs.mountain_car import MountainCar
 
 JMORL = Path(sys.executable).with_name("jmorl")

@@ -71,7 +71,7 @@ def test_a_row_for_every_generation(make_run):
 def test_what_a_run_lacks_has_no_column(make_run):
     assert "utility" not in printed(run_tables(make_run(has_utility=False)))
     only_warm_up = printed(run_tables(make_run(generations=0)))
-    assert "predict" not in only_warm_up and "candi" not in only_warm_up
+    assert "model" not in only_warm_up and "candi" not in only_warm_up
     assert "Decisions" not in printed(run_tables(make_run(generations=0, finished=False)))
 
 
@@ -101,21 +101,27 @@ def test_the_chosen_policy_is_marked_once_the_run_has_ended(make_run):
     assert "state        unfinished" in unfinished and "Front so far" in unfinished
 
 
-def test_an_evaluation_is_mean_spread_and_extremes():
+def test_an_evaluation_is_mean_error_spread_and_extremes():
     returns = np.random.default_rng(1).normal([-70, -40], [2, 5], (50, 2))
-    objectives = [vars(objective) for objective in envs.make("mo-mountaincarcontinuous-v0").objectives]
-    header = {
-        "id": 17,
-        "environment": "mo-mountaincarcontinuous-v0",
-        "objectives": objectives,
-        "values": [-71.0, -39.0],
-    }
-    text = printed([evaluation_table(header, EpisodeReturns(returns, 0.5 * returns, np.full(50, 70)))])
+    environment = envs.make("mo-mountaincarcontinuous-v0")
+    objectives = [vars(objective) for objective in environment.objectives]
+    header = {"id": 17, "environment": environment.id, "objectives": objectives, "values": [-71.0, -39.0]}
+    text = printed([evaluation_table(header, EpisodeReturns(returns, 0.5 * returns, np.arange(60, 110)))])
     assert text.startswith("Policy 17 in 50 fresh episodes of mo-mountaincarcontinuous-v0")
-    for row, column, stored in zip(section(text, "Policy 17"), returns.T, header["values"], strict=True):
-        expected = [column.mean(), column.std(), column.min(), column.max(), stored, 0.5 * column.mean()]
-        numbers = [float(word.strip("±")) for word in row[2:]]
-        assert numbers == pytest.approx(expected, abs=0.051)
+    assert "Episodes of 60 to 109 steps, 84.5 on average." in text
+    assert max(map(len, text.splitlines())) <= 80
+    rows = [line.split() for line in text.splitlines() if "(-" in line]
+    for row, column, stored in zip(rows, returns.T, header["values"], strict=True):
+        error = np.std(column, ddof=1) / np.sqrt(50)
+        expected = [column.mean(), error, column.std(), column.min(), column.max(), stored, 0.5 * column.mean()]
+        assert [float(word) for word in row[2:]] == pytest.approx(expected, abs=0.051)
+
+
+def test_a_single_episode_has_no_standard_error():
+    header = {"id": 1, "environment": "e", "objectives": [{"name": "a", "label": "a", "unit": "u"}], "values": [1.0]}
+    returns = EpisodeReturns(np.array([[2.0]]), np.array([[1.5]]), np.array([7]))
+    text = printed([evaluation_table(header, returns)])
+    assert "Policy 1 in 1 fresh episode of e" in text and "nan" not in text
 
 
 def test_every_environment_is_listed():

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.core import Objective
-from jmorl.report.limits import core
+from jmorl.display.limits import core
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 REASONS = {  # why a run ended

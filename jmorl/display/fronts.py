@@ -10,8 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from envs.core import Objective
-from jmorl.report.limits import around, core, inside
-from jmorl.report.text import number_format, plural
+from jmorl.display.limits import around, core, inside
+from jmorl.display.text import number_format, plural
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy, values_of
 
@@ -36,7 +36,7 @@ def front_table(
     """
     values = values_of(list(policies))
     spreads = np.stack([policy.spread for policy in policies])
-    inside = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
+    bounded = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
     scores = [_scores(*column) for column in zip(values.T, spreads.T, strict=True)]
     table = plain_table("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
@@ -47,8 +47,8 @@ def front_table(
             *(column[index] for column in scores),
             " ".join(f"{weight:.2g}" for weight in policy.weights),
             str(policy.generation),
-            notes.get(True, "" if inside[index] else "outside the bounds"),
-            style="bold" if policy.id == chosen_id else None if inside[index] else "dim",
+            notes.get(True, "" if bounded[index] else "outside the bounds"),
+            style="bold" if policy.id == chosen_id else None if bounded[index] else "dim",
         )
     return table
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from envs.core import Objective
-from jmorl.report.text import duration, number, number_format, plural, short_count, values_in_words
+from jmorl.display.text import duration, number, number_format, plural, short_count, values_in_words
 
 
 @given(st.floats(1e-4, 1e7), st.integers(2, 5), st.floats(-1e3, 1e3))

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from jmorl.report.limits import around, core, hopeful, inside
+from jmorl.display.limits import around, core, hopeful, inside
 
 VECTORS = arrays(float, st.tuples(st.integers(1, 12), st.integers(1, 3)), elements=st.floats(-100, 100))
 

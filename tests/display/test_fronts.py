@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from envs.core import Objective
-from jmorl.report.fronts import front_scatter, front_table
+from jmorl.display.fronts import front_scatter, front_table
 from jmorl.search.policy import Policy
 
 OBJECTIVES = (Objective("time", "time", "-steps"), Objective("fuel", "fuel", "-litres"))
