@@ -9,6 +9,7 @@ same start positions: the run's own evaluation starts, and for the chosen policy
 """
 
 import argparse
+import functools
 import json
 import sys
 from collections.abc import Iterator
@@ -128,8 +129,12 @@ def _best(front: tuple[Policy, ...], column: int) -> Policy:
 
 def _exact(keys: jax.Array) -> np.ndarray:
     """The exact front's utility for each user, [3], from the starts of these keys."""
-    positions = np.asarray(jax.vmap(envs.make(ENVIRONMENT).initial_state)(keys).position)
-    return (exact_front(WEIGHTS, positions) * WEIGHTS).sum(axis=1)
+    return _exact_from(tuple(jax.vmap(envs.make(ENVIRONMENT).initial_state)(keys).position.tolist()))
+
+
+@functools.cache
+def _exact_from(positions: tuple[float, ...]) -> np.ndarray:
+    return (exact_front(WEIGHTS, np.array(positions)) * WEIGHTS).sum(axis=1)
 
 
 def _fresh_shortfall(config: Config, chosen: Policy, column: int) -> float:

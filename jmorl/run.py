@@ -5,7 +5,7 @@ the command line, the run folder, a page, reads the same events.
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -101,6 +101,7 @@ class GenerationFinished:
     steps: int  # environment steps used for learning so far
     seconds: Seconds
     steps_per_second: float  # of this generation, selection and evaluation included
+    training: Mapping[str, float]  # losses, entropy and KL divergence of the last iteration, means over the agents
     front: FrontMetrics
     utility: UtilityMetrics
     prediction: PredictionMetrics
@@ -294,7 +295,9 @@ class _Run:
         """Train learners [P] with weights [P, M], evaluate them, and take them in."""
         started = time.perf_counter()
         key = jax.random.fold_in(self.training_key, state.generation)
-        learners, _ = self.population.train(learners, weights, key, iterations)
+        learners, diagnostics = self.population.train(
+            learners, weights, key, iterations, self.config.learning_rate(state.iterations)
+        )
         trained = time.perf_counter()
         scores = raw_scores(self.population.evaluate(learners, self.start_keys))
         evaluated = time.perf_counter()
@@ -315,6 +318,7 @@ class _Run:
             state.iterations * self.config.steps_per_iteration,
             seconds,
             iterations * self.config.steps_per_iteration / seconds.total,
+            diagnostics.means(),
             front_metrics(state.archive.values, _reference_point(state), self.candidate_weights),
             utility_metrics(self.decision_maker.utility, state.archive.members, state.buffer.members, state.bounds),
             prediction_metrics(lineage.parents if lineage else (), offspring, range_scale(state.archive.values)),

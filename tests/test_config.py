@@ -33,8 +33,9 @@ OTHER = {
     "ppo.epochs": 5,
     "ppo.minibatches": 16,
     "ppo.learning_rate": 1e-3,
+    "ppo.final_learning_rate": 1e-4,
     "ppo.adam_epsilon": 1e-8,
-    "ppo.discount": 0.99,
+    "ppo.discount": 0.98,
     "ppo.gae_lambda": 0.9,
     "ppo.clip": 0.1,
     "ppo.value_coefficient": 1.0,
@@ -44,7 +45,7 @@ OTHER = {
     "ppo.hidden_sizes": (32,),
     "ppo.weights_on": "scaled",
     "evaluation.episodes": 8,
-    "search.delta": 0.2,
+    "search.delta": 0.3,
     "search.bounds_scale": "one",
     "search.gain_within": "front",
     "search.value_scale": "none",
@@ -82,7 +83,7 @@ def test_every_setting_is_used_outside_the_config(name):
     attribute = name.rpartition(".")[2]
     sources = [path for path in Path("jmorl").rglob("*.py") if path.name != "config.py"]
     used = re.compile(rf"(config|search|ppo|population|evaluation)\.{attribute}\b")
-    budget = {"steps": "iteration_budget"}
+    budget = {"steps": "iteration_budget", "ppo.final_learning_rate": r"config\.learning_rate\("}
     used = re.compile(budget[name]) if name in budget else used
     assert any(used.search(path.read_text()) for path in sources)
 
@@ -159,6 +160,15 @@ def test_the_paper_preset_has_the_papers_sizes():
     assert (config.population.warmup_iterations, config.population.iterations) == (10, 10)
     assert config.steps_per_iteration * config.population.iterations == 240_000
     assert config.iteration_budget == 104  # so 2.5 M steps end after 2.64 M
+    assert (config.ppo.discount, config.ppo.gae_lambda, config.search.delta) == (0.995, 0.95, 0.1)
+
+
+def test_the_learning_rate_falls_with_the_share_of_the_budget_that_is_used():
+    config = resolve().replace(ppo={"learning_rate": 1e-3, "final_learning_rate": 1e-4})
+    budget = config.iteration_budget
+    assert [config.learning_rate(done) for done in (0, budget // 2, budget, budget + 10)] == pytest.approx(
+        [1e-3, 5.5e-4, 1e-4, 1e-4]
+    )
 
 
 def test_a_config_cannot_be_changed_in_place():

@@ -61,6 +61,13 @@ class Batch(NamedTuple):
     returns: jax.Array  # [B, M] in reward-scaled units
 
 
+class Schedule(NamedTuple):
+    """What changes between the calls of `train`: data, so that all share one compilation."""
+
+    iterations: jax.typing.ArrayLike  # [] int32
+    learning_rate: jax.typing.ArrayLike  # [] float32
+
+
 class Diagnostics(NamedTuple):
     """Of one iteration: means over the last epoch's minibatches, and where numbers stopped being finite."""
 
@@ -70,6 +77,10 @@ class Diagnostics(NamedTuple):
     approximate_kl: jax.Array  # [] between the policy that acted and the updated one
     fault: jax.Array  # [] int32 index into FAULTS
     fault_iteration: jax.Array  # [] int32, from 1; meaningless without a fault
+
+    def means(self) -> dict[str, float]:
+        """The numbers of a population [P], averaged over its agents."""
+        return {name: float(getattr(self, name).mean()) for name in self._fields if not name.startswith("fault")}
 
 
 FAULTS = ("none", "observation", "reward", "loss")
@@ -92,9 +103,12 @@ class MOPPO:
 
     @cached_property
     def optimizer(self) -> optax.GradientTransformation:
-        # Flattened: one vector operation instead of one for each of a dozen small arrays.
-        adam = optax.adam(self.config.learning_rate, eps=self.config.adam_epsilon)
-        return optax.flatten(optax.chain(optax.clip_by_global_norm(self.config.max_gradient_norm), adam))
+        """Clipping and Adam, but for the learning rate, which is data.
+
+        Flattened: one vector operation instead of one for each of a dozen small arrays.
+        """
+        clip = optax.clip_by_global_norm(self.config.max_gradient_norm)
+        return optax.flatten(optax.chain(clip, optax.scale_by_adam(eps=self.config.adam_epsilon)))
 
     def initial_learner(self, key: jax.Array) -> Learner:
         """A new agent's networks, optimiser and statistics."""
@@ -112,12 +126,11 @@ class MOPPO:
         )
 
     def train(
-        self, learner: Learner, weights: jax.Array, key: jax.Array, iterations: jax.Array
+        self, learner: Learner, weights: jax.Array, key: jax.Array, schedule: Schedule
     ) -> tuple[Learner, Diagnostics]:
-        """`iterations` [] PPO iterations with `weights` [M], from freshly reset environments.
+        """PPO iterations with `weights` [M], from freshly reset environments.
 
-        Rollouts continue from one iteration to the next. The number of iterations is data, so a warm-up and
-        a generation of different lengths share one compilation.
+        Rollouts continue from one iteration to the next.
         """
         workers_key, iterations_key = jax.random.split(key)
         zero = jnp.zeros(())
@@ -126,11 +139,13 @@ class MOPPO:
         def body(index: jax.Array, carry: Any) -> Any:
             learner, workers, previous = carry
             iteration_key = jax.random.fold_in(iterations_key, index)
-            learner, workers, diagnostics = self.iteration(learner, workers, weights, iteration_key)
+            learner, workers, diagnostics = self.iteration(
+                learner, workers, weights, iteration_key, schedule.learning_rate
+            )
             return learner, workers, _keep_first_fault(previous, diagnostics, index + 1)
 
         learner, _, diagnostics = jax.lax.fori_loop(
-            0, iterations, body, (learner, self.start_workers(workers_key), start)
+            0, schedule.iterations, body, (learner, self.start_workers(workers_key), start)
         )
         return learner, diagnostics
 
@@ -141,13 +156,18 @@ class MOPPO:
         return Workers(states, observations, sums)
 
     def iteration(
-        self, learner: Learner, workers: Workers, weights: jax.Array, key: jax.Array
+        self,
+        learner: Learner,
+        workers: Workers,
+        weights: jax.Array,
+        key: jax.Array,
+        learning_rate: jax.typing.ArrayLike,
     ) -> tuple[Learner, Workers, Diagnostics]:
         """Collect E*T steps, then update on them."""
         rollout_key, update_key = jax.random.split(key)
         workers, trajectory, return_statistics = self.collect(learner, workers, rollout_key)
         batch = self.batch(learner, trajectory, return_scale(return_statistics), weights)
-        parameters, optimizer_state, diagnostics = self.update(learner, batch, update_key)
+        parameters, optimizer_state, diagnostics = self.update(learner, batch, update_key, learning_rate)
         updated = Learner(
             parameters,
             optimizer_state,
@@ -206,7 +226,9 @@ class MOPPO:
         )
         return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), batch)
 
-    def update(self, learner: Learner, batch: Batch, key: jax.Array) -> tuple[Parameters, optax.OptState, Diagnostics]:
+    def update(
+        self, learner: Learner, batch: Batch, key: jax.Array, learning_rate: jax.typing.ArrayLike
+    ) -> tuple[Parameters, optax.OptState, Diagnostics]:
         """`epochs` passes over the batch, each in a new order and `minibatches` steps of the optimiser."""
         size = batch.advantage.shape[0]
 
@@ -215,20 +237,21 @@ class MOPPO:
             return jax.lax.scan(minibatch, carry, order)
 
         def minibatch(carry: Any, indices: jax.Array) -> Any:
-            return self.gradient_step(carry, jax.tree.map(lambda x: x[indices], batch))
+            return self.gradient_step(carry, jax.tree.map(lambda x: x[indices], batch), learning_rate)
 
         epoch_keys = jax.random.split(key, self.config.epochs)
         carry, diagnostics = jax.lax.scan(epoch, (learner.parameters, learner.optimizer_state), epoch_keys)
         return *carry, jax.tree.map(lambda x: x[-1].mean(0), diagnostics)
 
     def gradient_step(
-        self, carry: tuple[Parameters, optax.OptState], minibatch: Batch
+        self, carry: tuple[Parameters, optax.OptState], minibatch: Batch, learning_rate: jax.typing.ArrayLike
     ) -> tuple[tuple[Parameters, optax.OptState], Diagnostics]:
         """One step of the optimiser down the loss of a minibatch."""
         parameters, optimizer_state = carry
         gradients, diagnostics = jax.grad(self.loss, has_aux=True)(parameters, minibatch)
-        updates, optimizer_state = self.optimizer.update(gradients, optimizer_state, parameters)
-        return (optax.apply_updates(parameters, updates), optimizer_state), diagnostics
+        directions, optimizer_state = self.optimizer.update(gradients, optimizer_state, parameters)
+        parameters = jax.tree.map(lambda x, direction: x - learning_rate * direction, parameters, directions)
+        return (parameters, optimizer_state), diagnostics
 
     def loss(self, parameters: Parameters, batch: Batch) -> tuple[jax.Array, Diagnostics]:
         """The PPO loss of one minibatch, and its parts."""

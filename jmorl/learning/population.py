@@ -10,7 +10,7 @@ from jax.sharding import Mesh, PartitionSpec
 
 from envs.core import Environment
 from jmorl.config import Config
-from jmorl.learning.moppo import FAULTS, MOPPO, Diagnostics, Learner
+from jmorl.learning.moppo import FAULTS, MOPPO, Diagnostics, Learner, Schedule
 from jmorl.learning.rollout import EpisodeReturns
 
 AGENTS = "agents"  # the mesh axis
@@ -46,7 +46,7 @@ class Population:
         keys = jax.random.split(start_keys[0], self.size)
         learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys)
         weights = np.zeros((self.size, len(self.moppo.environment.objectives)), np.float32)
-        self._train = self._train.lower(learners, weights, keys, np.int32(0)).compile()
+        self._train = self._train.lower(learners, weights, keys, _schedule(0, 0.0)).compile()
         self._evaluate = self._evaluate.lower(learners, start_keys).compile()
         return time.perf_counter() - started
 
@@ -55,15 +55,18 @@ class Population:
         return jax.device_get(self._initialize(jax.random.split(key, self.size)))
 
     def train(
-        self, learners: Learner, weights: np.ndarray, key: jax.Array, iterations: int
+        self, learners: Learner, weights: np.ndarray, key: jax.Array, iterations: int, learning_rate: float
     ) -> tuple[Learner, Diagnostics]:
-        """Train every learner [P, ...] with its weights [P, M] for `iterations` PPO iterations.
+        """Train every learner [P, ...] with its weights [P, M] for `iterations` PPO iterations at one
+        learning rate.
 
         Raises TrainingFault, naming agents, causes and iterations, if any number stopped being finite.
         """
         keys = jax.random.split(key, self.size)
         weights = np.asarray(weights, np.float32)
-        learners, diagnostics = jax.device_get(self._train(learners, weights, keys, np.int32(iterations)))
+        learners, diagnostics = jax.device_get(
+            self._train(learners, weights, keys, _schedule(iterations, learning_rate))
+        )
         _raise_faults(diagnostics)
         return learners, diagnostics
 
@@ -82,6 +85,10 @@ class Population:
 def device_count(agents: int, available: int) -> int:
     """How many devices a population uses: the largest divisor of its size that the machine has."""
     return max(count for count in range(1, min(agents, available) + 1) if agents % count == 0)
+
+
+def _schedule(iterations: int, learning_rate: float) -> Schedule:
+    return Schedule(np.int32(iterations), np.float32(learning_rate))
 
 
 def _sharded(function: Callable[..., Any], mesh: Mesh) -> Any:

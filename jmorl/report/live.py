@@ -113,6 +113,8 @@ class LiveView(Watcher):
             yield "chosen" if timeline.result else "last choice", f"policy {decided.chosen.id}: {values}"
             if np.isfinite(decided.bounds).any():
                 yield "bounds", values_in_words(decided.bounds, self.objectives, formats, "≥ ")
+        if timeline.finished and timeline.finished.candidates == 1 and timeline.decided:
+            yield "", "nothing but the choice itself lay within the bounds"
 
     def _front(self, timeline: Timeline) -> list[RenderableType]:
         """The front as a plot of two objectives, or as a table of more, if there is room."""

@@ -75,6 +75,8 @@ class Lines(Watcher):
             f"front of {event.front.front_size}",
             f"hypervolume {number(event.front.hypervolume)}",
         ]
+        if event.candidates == 1 and event.state.choice:
+            facts.append("nothing but the choice itself within the bounds")
         if event.utility.utility_max is not None:
             facts.append(f"best utility {number(event.utility.utility_max)}")
         times = f"train {duration(seconds.train)}, evaluate {duration(seconds.evaluate)}"
@@ -90,7 +92,8 @@ class Json(Watcher):
 
         {"event": "compiled", "seconds", "devices"}
         {"event": "generation", "generation": 0 is the warm-up, "generations": in the budget, "steps",
-         "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates", "bounds",
+         "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",
+         "policy_loss", "value_loss", "entropy", "approximate_kl", "bounds",
          "front_size", "hypervolume", "expected_utility", "sparsity", "utility_max", "utility_mean",
          "utility_mean_within_bounds", "prediction_error", "realized_change", "front": [policy, ...]}
         {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
@@ -131,7 +134,6 @@ class Json(Watcher):
                 return {"event": "finished", "reason": event.reason, "chosen": _policy_fields(event.chosen)}
 
     def _generation_fields(self, event: GenerationFinished) -> dict[str, Any]:
-        prediction = {"prediction_error": None, "realized_change": None}
         return {
             "event": "generation",
             "generation": event.state.generation,
@@ -141,10 +143,11 @@ class Json(Watcher):
             "steps_per_second": event.steps_per_second,
             "seconds": asdict(event.seconds),
             "candidates": event.candidates,
+            **event.training,
             "bounds": event.state.bounds.tolist(),
             **asdict(event.front),
             **asdict(event.utility),
-            **(asdict(event.prediction) if event.prediction else prediction),
+            **asdict(event.prediction),
             "front": [_policy_fields(policy) for policy in event.state.archive.members],
         }
 

@@ -104,6 +104,7 @@ class RunFolder:
             "policies_shown": state.policies_shown,
             "candidates": event.candidates,
             **self._named("bound", state.bounds),
+            **event.training,
             **asdict(event.front),
             **asdict(event.utility),
             **asdict(event.prediction),

@@ -7,7 +7,7 @@ import pytest
 
 from jmorl.config import PPOConfig
 from jmorl.learning.losses import normalize_advantages
-from jmorl.learning.moppo import MOPPO, _random_order
+from jmorl.learning.moppo import MOPPO, Schedule, _random_order
 from jmorl.learning.returns import discounted_sums
 from jmorl.learning.statistics import normalize, return_scale
 from tests.probes import Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
@@ -18,7 +18,8 @@ QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rat
 def learned(environment, weights=(0.5, 0.5), iterations=40, **settings):
     moppo = MOPPO(environment, PPOConfig(**{**QUICK, **settings}))
     start = moppo.initial_learner(jax.random.key(0))
-    learner, _ = jax.jit(moppo.train)(start, jnp.array(weights), jax.random.key(1), iterations)
+    schedule = Schedule(iterations, moppo.config.learning_rate)
+    learner, _ = jax.jit(moppo.train)(start, jnp.array(weights), jax.random.key(1), schedule)
     return moppo, learner
 
 

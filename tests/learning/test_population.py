@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jmorl.config import Config
-from jmorl.learning.moppo import MOPPO
+from jmorl.learning.moppo import MOPPO, Schedule
 from jmorl.learning.population import Population, TrainingFault, device_count
 from tests.probes import Faulty, ThreeWays
 
@@ -16,6 +16,7 @@ CONFIG = Config(
 )
 WEIGHTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.3, 0.5]])
 ITERATIONS = 3
+RATE = 3e-4
 
 
 def compiled(environment, config=CONFIG, episodes=2):
@@ -50,10 +51,10 @@ def test_agents_start_different(start):
 
 def test_an_agent_in_the_population_is_the_agent_alone(population, start):
     key = jax.random.key(1)
-    together, _ = population.train(start, WEIGHTS, key, ITERATIONS)
+    together, _ = population.train(start, WEIGHTS, key, ITERATIONS, RATE)
     alone = jax.jit(MOPPO(ThreeWays(), CONFIG.ppo).train)
     for index, agent_key in enumerate(jax.random.split(key, 4)):
-        single, _ = alone(agent(start, index), WEIGHTS[index].astype(np.float32), agent_key, ITERATIONS)
+        single, _ = alone(agent(start, index), WEIGHTS[index].astype(np.float32), agent_key, Schedule(ITERATIONS, RATE))
         assert_close(agent(together, index), single, 1e-4)
 
 
@@ -61,9 +62,14 @@ def test_permuted_agents_give_permuted_results(population, start):
     """In one call only tasks differ between agents, so their order must not matter, given the keys."""
     order = np.array([2, 0, 3, 1])
     keys = jax.random.split(jax.random.key(1), 4)
-    plain, _ = population._train(start, WEIGHTS.astype(np.float32), keys, np.int32(ITERATIONS))
+    plain, _ = population._train(
+        start, WEIGHTS.astype(np.float32), keys, Schedule(np.int32(ITERATIONS), np.float32(RATE))
+    )
     permuted, _ = population._train(
-        agent(start, order), WEIGHTS[order].astype(np.float32), keys[order], np.int32(ITERATIONS)
+        agent(start, order),
+        WEIGHTS[order].astype(np.float32),
+        keys[order],
+        Schedule(np.int32(ITERATIONS), np.float32(RATE)),
     )
     assert_close(agent(jax.device_get(plain), order), jax.device_get(permuted))
 
@@ -74,15 +80,15 @@ def test_one_device_or_two_is_the_same(population, start, monkeypatch):
     single = compiled(ThreeWays())
     assert len(single.devices) == 1
     assert_close(
-        population.train(start, WEIGHTS, jax.random.key(1), ITERATIONS),
-        single.train(start, WEIGHTS, jax.random.key(1), ITERATIONS),
+        population.train(start, WEIGHTS, jax.random.key(1), ITERATIONS, RATE),
+        single.train(start, WEIGHTS, jax.random.key(1), ITERATIONS, RATE),
         1e-4,
     )
 
 
 def test_agents_with_the_same_parent_differ_by_their_keys(population, start):
     same = agent(start, np.zeros(4, int))
-    trained, _ = population.train(same, np.tile(WEIGHTS[3], (4, 1)), jax.random.key(1), 1)
+    trained, _ = population.train(same, np.tile(WEIGHTS[3], (4, 1)), jax.random.key(1), 1, RATE)
     kernels = trained.parameters["actor"]["params"]["MLP_0"]["Dense_0"]["kernel"]
     assert len(np.unique(kernels.reshape(4, -1), axis=0)) == 4
 
@@ -92,9 +98,9 @@ def test_after_compiling_nothing_is_traced_or_compiled_again(population, start):
 
     events = []
     jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: events.append(event))
-    population.train(start, WEIGHTS, jax.random.key(1), 1)  # keys are split here for the first time
+    population.train(start, WEIGHTS, jax.random.key(1), 1, RATE)  # keys are split here for the first time
     events.clear()
-    trained, _ = population.train(start, WEIGHTS, jax.random.key(2), 2)
+    trained, _ = population.train(start, WEIGHTS, jax.random.key(2), 2, RATE)
     population.evaluate(trained, jax.random.split(jax.random.key(9), 2))
     assert not [event for event in events if "trac" in event or "compile" in event]
     jax.jit(lambda x: x + 1)(np.ones(3))
@@ -122,9 +128,9 @@ def test_numbers_that_are_not_finite_are_found_in_their_iteration_and_named(wher
     config = CONFIG.replace(ppo={"rollout_steps": 4, "environments": 2, "minibatches": 2})
     population = compiled(Faulty(where, breaks_at=7, value=value), config)
     start = population.initialize(jax.random.key(0))
-    population.train(start, WEIGHTS, jax.random.key(1), 1)
+    population.train(start, WEIGHTS, jax.random.key(1), 1, RATE)
     with pytest.raises(TrainingFault, match=f"agent 0: {where} is not finite in iteration 2; agent 1") as error:
-        population.train(start, WEIGHTS, jax.random.key(1), 3)
+        population.train(start, WEIGHTS, jax.random.key(1), 3, RATE)
     assert str(error.value).count("agent") == 4
 
 
@@ -132,4 +138,4 @@ def test_a_broken_learner_is_found_and_named(population, start):
     broken = jax.tree.map(np.copy, start)
     broken.parameters["critic"]["params"]["Dense_0"]["bias"][2] = np.nan
     with pytest.raises(TrainingFault, match="^agent 2: loss is not finite in iteration 1$"):
-        population.train(broken, WEIGHTS, jax.random.key(1), 2)
+        population.train(broken, WEIGHTS, jax.random.key(1), 2, RATE)

@@ -100,7 +100,7 @@ def test_optimiser_steps(moppo, steps, group):
     start = parameters("parameters")
     carry = start, moppo.optimizer.init(start)
     for _ in range(steps):
-        carry, _ = jax.jit(moppo.gradient_step)(carry, batch())
+        carry, _ = jax.jit(moppo.gradient_step)(carry, batch(), moppo.config.learning_rate)
     changes = jax.tree.map(lambda after, before: after - before, carry[0], start)
     assert_trees_close(changes, parameters(group), rtol=1e-4, atol=1e-9)  # stored in float32
 

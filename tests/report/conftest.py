@@ -127,12 +127,13 @@ def _finished(state: RunState, offspring: tuple[Policy, ...], has_utility: bool)
         candidates=3 * state.generation,
         steps=STEPS * (state.generation + 1),
         seconds=Seconds(0.1 * bool(state.generation), 9.1, 0.9),
+        training={"policy_loss": -0.01, "value_loss": 0.2, "entropy": 0.5, "approximate_kl": 0.01},
         steps_per_second=23_456.7 + 100 * state.generation,
         front=front_metrics(state.archive.values, -2 * SCALES[:objectives], simplex_grid(objectives, 10)),
         utility=UtilityMetrics(float(utility.max()), mean, within_bounds)
         if has_utility
         else UtilityMetrics(None, None, None),
-        prediction=PredictionMetrics(0.02, 0.08) if state.generation else None,
+        prediction=PredictionMetrics(0.02, 0.08) if state.generation else PredictionMetrics(None, None),
     )
 
 
@@ -159,5 +160,5 @@ def _row(event: GenerationFinished) -> dict[str, float | None]:
         **{f"bound_{name}": value for name, value in zip(names, bounds, strict=False)},
         **vars(event.front),
         **vars(event.utility),
-        **(vars(event.prediction) if event.prediction else {"prediction_error": None, "realized_change": None}),
+        **vars(event.prediction),
     }
