@@ -84,6 +84,9 @@ class PPOConfig(Section):
     entropy_coefficient: NonNegative = Field(0.0, description="weight of the entropy bonus")
     max_gradient_norm: Positive = Field(0.5, description="one global norm over all parameters")
     initial_log_std: Finite = Field(0.0, description="log standard deviation of a new agent's actions")
+    noise_correlation: Annotated[float, Field(ge=0, lt=1)] = Field(
+        0.0, description="of the exploration noise of successive actions"
+    )
     hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1)] = Field(
         (64, 64), description="hidden layers of actor and critic"
     )
@@ -224,6 +227,7 @@ _TUNED_CAR = {
         "gae_lambda": 0.98,
         "learning_rate": 6e-4,
         "final_learning_rate": 3e-5,
+        "noise_correlation": 0.5,
     },
     "search": {"delta": 0.2},
 }

@@ -42,6 +42,7 @@ OTHER = {
     "ppo.entropy_coefficient": 0.01,
     "ppo.max_gradient_norm": 1.0,
     "ppo.initial_log_std": -0.5,
+    "ppo.noise_correlation": 0.2,
     "ppo.hidden_sizes": (32,),
     "ppo.weights_on": "scaled",
     "evaluation.episodes": 8,

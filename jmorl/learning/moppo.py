@@ -184,7 +184,12 @@ class MOPPO:
         keys = jax.random.split(key, self.config.environments)
         (states, observations), trajectory = jax.vmap(
             lambda key, state, observation: rollout(
-                self.environment, policy, key, (state, observation), self.config.rollout_steps
+                self.environment,
+                policy,
+                key,
+                (state, observation),
+                self.config.rollout_steps,
+                self.config.noise_correlation,
             )
         )(keys, workers.states, workers.observations)
         ended = trajectory.terminated | trajectory.truncated

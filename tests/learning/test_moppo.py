@@ -9,6 +9,7 @@ from jmorl.config import PPOConfig
 from jmorl.learning.losses import normalize_advantages
 from jmorl.learning.moppo import MOPPO, Schedule, _random_order
 from jmorl.learning.returns import discounted_sums
+from jmorl.learning.rollout import correlated_noise
 from jmorl.learning.statistics import normalize, return_scale
 from tests.probes import Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
 
@@ -49,6 +50,14 @@ def test_every_index_is_equally_likely_in_every_place():
 def test_advantages_of_one_sample_or_all_equal_are_zero_not_nan():
     for advantages in (jnp.array([3.0]), jnp.full(8, -2.0)):
         np.testing.assert_array_equal(normalize_advantages(advantages), jnp.zeros_like(advantages))
+
+
+def test_correlated_noise_is_standard_normal_with_its_correlation():
+    noise = correlated_noise(jax.random.key(0), (100_000, 1), 0.8)[:, 0]
+    np.testing.assert_allclose([noise.mean(), noise.std()], [0.0, 1.0], atol=0.03)
+    np.testing.assert_allclose(np.corrcoef(noise[:-1], noise[1:])[0, 1], 0.8, atol=0.01)
+    first = jax.vmap(lambda key: correlated_noise(key, (3, 1), 0.8)[:, 0])(jax.random.split(jax.random.key(1), 20_000))
+    np.testing.assert_allclose(first.std(0), 1.0, atol=0.03)  # from the very first step
 
 
 def test_discounted_sums_equal_a_loop():
