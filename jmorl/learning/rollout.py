@@ -32,7 +32,8 @@ def rollout(
 ) -> tuple[tuple[EpisodeState[Any], jax.Array], Trajectory]:
     """Act for `steps` steps with sampled actions, across episode ends.
 
-    The noise of successive actions has this correlation; that of each action stays standard normal. Returns where to continue, and the trajectory [T, ...].
+    The noise of successive actions has this correlation; that of each action stays standard normal.
+    Returns where to continue, and the trajectory [T, ...].
     """
     noise_key, reset_key = jax.random.split(key)
     # Drawn outside the scan: one large draw is much cheaper than T small ones.
