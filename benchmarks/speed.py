@@ -170,7 +170,11 @@ def _iteration_seconds(config: Config, iterations: int) -> float:
     population.compile(evaluation_keys(config))
     learners = population.initialize(jax.random.key(0))
     weights = spread_weights(2, config.population.agents)
-    train: Callable[[], Any] = lambda: population.train(learners, weights, jax.random.key(1), iterations)  # noqa: E731
+    rate = config.ppo.learning_rate
+
+    def train() -> None:
+        population.train(learners, weights, jax.random.key(1), iterations, rate)
+
     return _median_seconds(train) / iterations
 
 
