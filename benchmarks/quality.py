@@ -51,10 +51,10 @@ def main() -> None:
         rows += _judged(config, options.users if method == "pgmorl" else [user])
         if options.verbose:
             print(json.dumps(rows[-1]), flush=True)
+        report = {"preset": options.preset, "set": options.set, "rows": rows}  # after every run: none is lost
+        options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     Console().print(_table(rows))
     Console().print(_summary(rows))
-    report = {"preset": options.preset, "set": options.set, "rows": rows}
-    options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 def _options() -> argparse.Namespace:
