@@ -61,7 +61,7 @@ def test_terminal_and_script(objectives_of, tmp_path):
 
 @pytest.mark.parametrize("spec", ["A", "weights=1,2,3", "weights=1,2,chebyshev", "target=1", "terminal"])
 def test_without_a_known_number_of_objectives_any_number_passes(spec):
-    parse_user(spec, None)
+    assert callable(parse_user(spec, None))
 
 
 @pytest.mark.parametrize(
