@@ -1,0 +1,303 @@
+"""What the planar dynamics need to know of a MuJoCo model, and the models they can represent.
+
+Joints and bodies are kept in *level order*: the root's slides and hinge, then every body one joint below the root, two
+below, and so on, so that one array holds a whole level. The geometry of a body is told in the frame of its hinge: the
+origin at the hinge's anchor, turned with the body. A *slot* is one capsule with its share of a body: a body has one for
+each of its capsules, or one without a capsule, and the first of them carries the inertia.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from envs.planar.support import collide, unsupported
+
+FAR = 1e6  # radians or metres: a limit that is never reached, and finite so that it never makes a NaN
+# MuJoCo's bounds of solimp: least, greatest, width, midpoint, power.
+IMPEDANCE_BOUNDS = (1e-4, 1e-4, 1e-15, 1e-4, 1.0), (0.9999, 0.9999, np.inf, 0.9999, np.inf)
+LEAST_FRICTION = 1e-5  # MuJoCo's mjMINMU
+
+
+class UnsupportedModel(ValueError):
+    """A model that moves out of the plane, or uses what is not implemented. `problems` names each thing."""
+
+    def __init__(self, problems: list[str]):
+        self.problems = problems
+        super().__init__("not a model of the planar dynamics: " + "; ".join(problems))
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """Soft constraints' parameters, one entry for each row family (MuJoCo, "Computation: constraint model")."""
+
+    impedance: np.ndarray  # [5, ...] solimp: least, greatest, width, midpoint, power
+    stiffness: np.ndarray  # [...] K of the reference acceleration -B v - K I(d) d
+    damping: np.ndarray  # [...] B
+    diagonal: np.ndarray  # [...] diagApprox: regularisation is diagonal * (1 - I) / I
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The bodies as many joints away from the root. Level 0 is the root alone."""
+
+    bodies: slice  # among all bodies, in level order
+    slots: slice  # among all slots
+    slot_body: np.ndarray  # [slots] each slot's body, within the level
+    first_slot: np.ndarray  # [bodies] among all slots
+    parent: np.ndarray  # [bodies] each body's parent, within the level before (level 0: empty)
+    anchor: np.ndarray  # [2, bodies] the hinge's anchor in the parent's frame, metres
+
+    @property
+    def count(self) -> int:
+        return self.bodies.stop - self.bodies.start
+
+    @property
+    def dofs(self) -> slice:
+        """The bodies' hinges among all degrees of freedom, which begin with the root's two slides."""
+        return slice(self.bodies.start + 2, self.bodies.stop + 2)
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarModel:
+    """A tree of bodies that slide and turn in the plane (x, z); rotation about +y. SI units.
+
+    V degrees of freedom in level order: slide x, slide z, the root's hinge, the other hinges.
+    """
+
+    timestep: float
+    gravity: float  # downwards
+    dofs: np.ndarray  # [V] index in MuJoCo's order of each degree of freedom
+    levels: tuple[Level, ...]
+    root_position: np.ndarray  # [2] of the root's anchor at zero slides
+    angle: np.ndarray  # [bodies] of a body against its parent at zero joint angle
+    hinge_sign: np.ndarray  # [bodies] the hinge's direction about +y
+    slot_centre: np.ndarray  # [2, slots] centre of mass, in the body's frame
+    slot_ends: np.ndarray  # [2, 2 ends, slots] of the capsule, in the body's frame
+    slot_mass: np.ndarray  # [slots]
+    slot_inertia: np.ndarray  # [slots] about the centre of mass
+    contact_distance: np.ndarray  # [slots] height of a capsule end at which its contact begins
+    ground: float  # height of the plane
+    friction: np.ndarray  # [slots]
+    contact: Constraints  # [slots]
+    joint_stiffness: np.ndarray  # [V]
+    joint_rest: np.ndarray  # [V]
+    joint_damping: np.ndarray  # [V]
+    armature: np.ndarray  # [V]
+    hinge_range: np.ndarray  # [2, V - 2] far off where unlimited
+    limit: Constraints  # [V - 2]
+    control_range: np.ndarray  # [2, U]
+    actuator_gear: np.ndarray  # [V, U] joint force for one unit of control
+
+
+class _Slot(NamedTuple):
+    body: int
+    capsule: int | None
+    first: bool  # of its body: it carries the inertia
+
+
+def compile_model(model: mujoco.MjModel) -> PlanarModel:
+    """The planar view of a MuJoCo model. Raises UnsupportedModel, naming everything it cannot represent."""
+    problems = unsupported(model)
+    if problems:
+        raise UnsupportedModel(problems)
+    bodies, levels = _levels(model)
+    root = bodies[0]
+    return PlanarModel(
+        timestep=float(model.opt.timestep),
+        gravity=-float(model.opt.gravity[2]),
+        levels=levels,
+        root_position=_plane(model.body_pos[root]) + _plane(model.jnt_pos[_hinge(model, root)]) - model.qpos0[:2],
+        **_joints(model, [_hinge(model, body) for body in bodies]),
+        **_slots(model, [slot for body in bodies for slot in _slots_of(model, body)]),
+        **_actuators(model, bodies),
+    )
+
+
+def _joints(model: mujoco.MjModel, hinges: list[int]) -> dict[str, Any]:
+    """The fields about joints, which are as many as degrees of freedom and share their numbers."""
+    dofs = np.array([0, 1, *hinges])
+    body = model.jnt_bodyid[hinges]
+    sign = model.jnt_axis[hinges, 1]
+    limited = np.asarray(model.jnt_limited, bool)[hinges, None]
+    return {
+        "dofs": dofs,
+        "angle": np.array([_angle(quaternion) for quaternion in model.body_quat[body]]) - sign * model.qpos0[hinges],
+        "hinge_sign": sign,
+        "hinge_range": np.where(limited, model.jnt_range[hinges], (-FAR, FAR)).T,
+        "limit": _constraints(
+            model.opt, model.jnt_solref[hinges], model.jnt_solimp[hinges], model.dof_invweight0[hinges]
+        ),
+        "joint_stiffness": model.jnt_stiffness[dofs],
+        "joint_rest": model.qpos_spring[dofs],
+        "joint_damping": model.dof_damping[dofs],
+        "armature": model.dof_armature[dofs],
+    }
+
+
+def _slots(model: mujoco.MjModel, slots: list[_Slot]) -> dict[str, Any]:
+    """The fields about slots."""
+    floor = _floor(model)
+    bodies = [slot.body for slot in slots]
+    capsules = [floor if slot.capsule is None else slot.capsule for slot in slots]
+    radius = [-FAR if slot.capsule is None else model.geom_size[slot.capsule, 0] for slot in slots]
+    friction = np.maximum(LEAST_FRICTION, [_friction(model, capsule, floor) for capsule in capsules])
+    return {
+        "slot_centre": np.stack([_centre(model, body) for body in bodies], axis=-1),
+        "slot_ends": np.stack([_ends(model, slot) for slot in slots], axis=-1),
+        "slot_mass": np.array([slot.first * model.body_mass[slot.body] for slot in slots]),
+        "slot_inertia": np.array([slot.first * _inertia(model, slot.body) for slot in slots]),
+        "contact_distance": np.array(radius),
+        "ground": float(model.geom_pos[floor, 2]),
+        "friction": friction,
+        "contact": _contact_constraints(model, bodies, capsules, friction),
+    }
+
+
+def _actuators(model: mujoco.MjModel, bodies: list[int]) -> dict[str, Any]:
+    """The fields about actuators."""
+    gear = np.zeros((model.nv, model.nu))
+    joints = model.actuator_trnid[:, 0]
+    gear[joints, np.arange(model.nu)] = model.actuator_gear[:, 0] * model.actuator_gainprm[:, 0]
+    limited = np.asarray(model.actuator_ctrllimited, bool)[:, None]
+    return {
+        "control_range": np.where(limited, model.actuator_ctrlrange, (-np.inf, np.inf)).T,
+        "actuator_gear": gear[[0, 1, *(_hinge(model, body) for body in bodies)]],
+    }
+
+
+def _levels(model: mujoco.MjModel) -> tuple[list[int], tuple[Level, ...]]:
+    """The bodies in level order, and the levels."""
+    rows: list[list[int]] = [[1]]
+    while below := [
+        body for parent in rows[-1] for body in range(2, model.nbody) if model.body_parentid[body] == parent
+    ]:
+        rows.append(below)
+    levels = []
+    bodies = slots = 0
+    for depth, row in enumerate(rows):
+        counts = [len(_slots_of(model, body)) for body in row]
+        above = rows[depth - 1] if depth else []
+        parents = [above.index(model.body_parentid[body]) for body in row] if depth else []
+        levels.append(
+            Level(
+                slice(bodies, bodies + len(row)),
+                slice(slots, slots + sum(counts)),
+                np.repeat(np.arange(len(row)), counts),
+                slots + np.cumsum([0, *counts[:-1]]),
+                np.array(parents, int),
+                np.stack([_anchor(model, body) for body in row], axis=-1) if depth else np.zeros((2, 1)),
+            )
+        )
+        bodies += len(row)
+        slots += sum(counts)
+    return [body for row in rows for body in row], tuple(levels)
+
+
+def _hinge(model: mujoco.MjModel, body: int) -> int:
+    """The joint by which a body turns: its last."""
+    return int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
+
+
+def _slots_of(model: mujoco.MjModel, body: int) -> list[_Slot]:
+    """One for each capsule of a body that can touch the ground, or one without."""
+    floor = _floor(model)
+    geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
+    capsules: list[int | None] = [geom for geom in geoms if collide(model, geom, floor)]
+    return [_Slot(body, capsule, index == 0) for index, capsule in enumerate(capsules or [None])]
+
+
+def _floor(model: mujoco.MjModel) -> int:
+    planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    return int(planes[0])
+
+
+def _plane(vector: np.ndarray) -> np.ndarray:
+    return np.array([vector[0], vector[2]])
+
+
+def _angle(quaternion: np.ndarray) -> float:
+    """The angle about +y of a rotation about y."""
+    return 2 * float(np.arctan2(quaternion[2], quaternion[0]))
+
+
+def _turned(angle: float, vector: np.ndarray) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * vector[0] + s * vector[1], c * vector[1] - s * vector[0]])
+
+
+def _anchor(model: mujoco.MjModel, body: int) -> np.ndarray:
+    """The anchor of a body's hinge in the frame of its parent's hinge."""
+    own = _turned(_angle(model.body_quat[body]), _plane(model.jnt_pos[_hinge(model, body)]))
+    return _plane(model.body_pos[body]) + own - _plane(model.jnt_pos[_hinge(model, int(model.body_parentid[body]))])
+
+
+def _inertia(model: mujoco.MjModel, body: int) -> float:
+    """Moment of inertia about the y axis through the centre of mass."""
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
+    return float(rotation.reshape(3, 3)[1] ** 2 @ model.body_inertia[body])
+
+
+def _centre(model: mujoco.MjModel, body: int) -> np.ndarray:
+    """Centre of mass [2] in the frame of the body's hinge."""
+    return _plane(model.body_ipos[body]) - _plane(model.jnt_pos[_hinge(model, body)])
+
+
+def _ends(model: mujoco.MjModel, slot: _Slot) -> np.ndarray:
+    """Capsule ends [2, 2 ends] in the frame of the body's hinge."""
+    if slot.capsule is None:
+        return np.zeros((2, 2))
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[slot.capsule])
+    half = _plane(rotation.reshape(3, 3)[:, 2]) * model.geom_size[slot.capsule, 1]
+    middle = _plane(model.geom_pos[slot.capsule]) - _plane(model.jnt_pos[_hinge(model, slot.body)])
+    return np.stack([middle + half, middle - half], axis=-1)
+
+
+def _contact_constraints(
+    model: mujoco.MjModel, bodies: list[int], capsules: list[int], friction: np.ndarray
+) -> Constraints:
+    """MuJoCo's mixture of two geoms' parameters, for a pyramidal cone of condim 3."""
+    floor = _floor(model)
+    solref, solimp = [], []
+    for capsule in capsules:
+        share = _share(model, capsule, floor)
+        solref.append(share * model.geom_solref[capsule] + (1 - share) * model.geom_solref[floor])
+        solimp.append(share * model.geom_solimp[capsule] + (1 - share) * model.geom_solimp[floor])
+    weight = model.body_invweight0[bodies, 0] + model.body_invweight0[0, 0]
+    diagonal = weight * (1 + friction**2) * 2 * friction**2 / model.opt.impratio
+    return _constraints(model.opt, np.array(solref), np.array(solimp), diagonal)
+
+
+def _share(model: mujoco.MjModel, one: int, other: int) -> float:
+    """How much of the first geom's parameters a contact takes."""
+    priority = model.geom_priority
+    if priority[one] != priority[other]:
+        return float(priority[one] > priority[other])
+    mix = model.geom_solmix
+    total = mix[one] + mix[other]
+    return float(mix[one] / total) if total > 0 else 0.5
+
+
+def _friction(model: mujoco.MjModel, one: int, other: int) -> float:
+    """Sliding friction: of the geom with priority, else the greater."""
+    share = _share(model, one, other) if model.geom_priority[one] != model.geom_priority[other] else None
+    of_one, of_other = (float(model.geom_friction[geom, 0]) for geom in (one, other))
+    return max(of_one, of_other) if share is None else share * of_one + (1 - share) * of_other
+
+
+def _constraints(option: mujoco.MjOption, solref: np.ndarray, solimp: np.ndarray, diagonal: np.ndarray) -> Constraints:
+    """Stiffness and damping of the reference acceleration, from solref [n, 2] and solimp [n, 5]."""
+    time, ratio = solref[:, 0], solref[:, 1]
+    if not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE:
+        time = np.maximum(time, 2 * option.timestep)
+    impedance = np.clip(solimp, *IMPEDANCE_BOUNDS)
+    greatest = impedance[:, 1]
+    return Constraints(
+        impedance=impedance.T,
+        stiffness=1 / (greatest * time * ratio) ** 2,
+        damping=2 / (greatest * time),
+        diagonal=np.asarray(diagonal, float),
+    )

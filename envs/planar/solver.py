@@ -1,0 +1,188 @@
+"""Accelerations: an elimination along the tree, and Newton's method for the constraints on top of it.
+
+The constrained acceleration minimises `1/2 |a - a_smooth|_M^2 + sum over active rows of 1/2 D (J a - aref)^2`.
+Newton's Hessian is `M + sum J' D J`, and a contact's `J' D J` is a spatial stiffness of the body it touches: the
+Hessian is built like a mass matrix, and one elimination along the tree solves it in O(bodies) (articulated bodies,
+Featherstone 2008).
+
+Spatial vectors about O are triples: motion (w, u, v), force (moment, f_x, f_z). What a body resists and what pulls at
+it are one array of nine components [9, n, batch]: the symmetric 3x3 as (ww, wu, wv, uu, uv, vv), then the force.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from envs.planar.constraints import (
+    Contacts,
+    Limits,
+    contact_residuals,
+    contact_stiffness,
+    limit_residuals,
+)
+from envs.planar.kinematics import Kinematics
+from envs.planar.model import Level, PlanarModel
+from envs.planar.tree import constant, pick, total
+
+FULL_STEPS = 8  # of Newton; what cycles longer takes half steps
+MAXIMAL_STEPS = 40
+
+
+class Joints(NamedTuple):
+    """What acts at the degrees of freedom: [V, batch] each."""
+
+    inertia: jax.Array  # added to the diagonal of the mass matrix
+    force: jax.Array
+
+
+def body_inertia(model: PlanarModel, moving: Kinematics) -> jax.Array:
+    """Each slot's inertia about O, with gravity and bias force as what pulls at it [9, slots, batch]."""
+    mass = constant(model.slot_mass, moving.centre)
+    x, z = moving.centre
+    force_x = -mass * moving.centre_acceleration[0]
+    force_z = -mass * (moving.centre_acceleration[1] + model.gravity)
+    moment = force_x * z - force_z * x
+    none = jnp.zeros_like(x)
+    turning = constant(model.slot_inertia, x) + mass * (x * x + z * z)
+    return jnp.stack([turning, mass * z, -mass * x, none + mass, none, none + mass, moment, force_x, force_z])
+
+
+def accelerations(
+    model: PlanarModel, anchors: tuple[jax.Array, ...], bodies: jax.Array, joints: Joints
+) -> tuple[jax.Array, jax.Array]:
+    """Joint accelerations [V, batch], and each slot's (w, u, v) [3, slots, batch], of `bodies` [9, slots, batch]."""
+    eliminated = []
+    carried: jax.Array | float = 0.0
+    for depth in range(len(model.levels) - 1, 0, -1):
+        level = model.levels[depth]
+        whole = _bodies(bodies, level) + carried
+        hinge = _eliminate(model, level, anchors[depth], whole, joints)
+        eliminated.append(hinge)
+        carried = total(_reduced(whole, hinge), level.parent, model.levels[depth - 1].count)
+    root = model.levels[0]
+    motion = _root_motion(_bodies(bodies, root) + carried, joints)
+    motions = [motion]
+    qacc = [motion[1], motion[2], constant(model.hinge_sign[:1], motion) * motion[0]]
+    for depth, level in enumerate(model.levels[1:], start=1):
+        hinge = eliminated[-depth]
+        w, u, v = above = pick(motions[-1], level.parent)
+        turn = (hinge.force - hinge.w * w - hinge.u * u - hinge.v * v) * hinge.inverse
+        x, z = anchors[depth]
+        motions.append(above + jnp.stack([turn, -z * turn, x * turn]))
+        qacc.append(constant(model.hinge_sign[level.bodies], turn) * turn)
+    return jnp.concatenate(qacc), _at_slots(model, motions)
+
+
+def _at_slots(model: PlanarModel, motions: list[jax.Array]) -> jax.Array:
+    slots = []
+    for motion, level in zip(motions, model.levels, strict=True):
+        picked = pick(motion, level.slot_body)
+        slots.append(jnp.broadcast_to(picked, (3, len(level.slot_body), motion.shape[-1])))
+    return jnp.concatenate(slots, axis=-2)
+
+
+def _bodies(slots: jax.Array, level: Level) -> jax.Array:
+    """A level's bodies' sums of all slots' values."""
+    return total(slots[..., level.slots, :], level.slot_body, level.count)
+
+
+class _Hinge(NamedTuple):
+    """An eliminated hinge: the force it takes to accelerate it by one (w, u, v); what drives it; 1 / its inertia."""
+
+    w: jax.Array
+    u: jax.Array
+    v: jax.Array
+    force: jax.Array
+    inverse: jax.Array
+
+
+def _eliminate(model: PlanarModel, level: Level, anchor: jax.Array, whole: jax.Array, joints: Joints) -> _Hinge:
+    """The hinges of a level, axes (1, -p_z, p_x) about O, of bodies [9, n, batch]."""
+    x, z = anchor
+    ww, wu, wv, uu, uv, vv, moment, force_x, force_z = whole
+    w = ww - z * wu + x * wv
+    u = wu - z * uu + x * uv
+    v = wv - z * uv + x * vv
+    sign = constant(model.hinge_sign[level.bodies], whole)
+    force = moment - z * force_x + x * force_z + sign * joints.force[level.dofs]
+    inverse = 1 / (w - z * u + x * v + joints.inertia[level.dofs])
+    return _Hinge(w, u, v, force, inverse)
+
+
+def _reduced(whole: jax.Array, hinge: _Hinge) -> jax.Array:
+    """What the parent feels of bodies [9, n, batch] whose hinges are free to give way."""
+    w, u, v, force, inverse = hinge
+    left = jnp.stack([w, w, w, u, u, v, w, u, v])
+    right = jnp.stack([w, u, v, u, v, v, force, force, force])
+    return whole - left * (right * inverse)
+
+
+def _root_motion(whole: jax.Array, joints: Joints) -> jax.Array:
+    """The root's (w, u, v) [3, 1, batch] from what it resists and feels [9, 1, batch]: a 3x3 solve, v first."""
+    ww, wu, wv, uu, uv, vv, moment, force_x, force_z = whole
+    uu, vv, ww = uu + joints.inertia[0:1], vv + joints.inertia[1:2], ww + joints.inertia[2:3]
+    force_x, force_z, moment = force_x + joints.force[0:1], force_z + joints.force[1:2], moment + joints.force[2:3]
+    by_v = 1 / vv
+    ww, wu, uu = ww - wv * wv * by_v, wu - wv * uv * by_v, uu - uv * uv * by_v
+    moment, force_x = moment - wv * force_z * by_v, force_x - uv * force_z * by_v
+    by_u = 1 / uu
+    w = (moment - wu * force_x * by_u) / (ww - wu * wu * by_u)
+    u = (force_x - wu * w) * by_u
+    v = (force_z - wv * w - uv * u) * by_v
+    return jnp.stack([w, u, v])
+
+
+class Solution(NamedTuple):
+    """Constrained accelerations, and the residuals of all rows there."""
+
+    qacc: jax.Array  # [V, batch]
+    contact_residuals: jax.Array  # [3, 2 ends, slots, batch]
+    limit_residuals: jax.Array  # [V - 2, batch]
+    steps: jax.Array  # [] of Newton, until no active set changed in the whole batch
+
+
+def constrained(
+    model: PlanarModel,
+    moving: Kinematics,
+    touching: Contacts,
+    stops: Limits,
+    bodies: jax.Array,
+    joints: Joints,
+) -> Solution:
+    """Newton's method from zero acceleration, with full steps.
+
+    A full step depends on the active rows alone, so a state whose active rows no longer change has arrived, exactly,
+    and stays where it is while the rest of the batch goes on. Full steps may cycle in principle: after `FULL_STEPS`
+    they are halved, until the active rows are those of the step's own end.
+    """
+
+    def step(carry: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
+        count, _, contact, limit, *_ = carry
+        held = jnp.where(limit < 0, stops.strength, 0.0)
+        none = jnp.zeros_like(joints.force[:2])
+        diagonal = joints.inertia + jnp.concatenate([none, held])
+        force = joints.force + jnp.concatenate([none, stops.direction * held * stops.reference])
+        stiff = bodies + contact_stiffness(touching, contact < 0)
+        qacc, motion = accelerations(model, moving.anchors, stiff, Joints(diagonal, force))
+        contact_end, limit_end = contact_residuals(touching, motion), limit_residuals(stops, qacc)
+        changed = _any(((contact_end < 0) != (contact < 0)) & (touching.strength > 0)) | _any(
+            ((limit_end < 0) != (limit < 0)) & (stops.strength > 0)
+        )
+        full = count < FULL_STEPS
+        contact = jnp.where(full, contact_end, 0.5 * (contact + contact_end))
+        limit = jnp.where(full, limit_end, 0.5 * (limit + limit_end))
+        return count + 1, changed, contact, limit, qacc, motion
+
+    def unsettled(carry: tuple[jax.Array, ...]) -> jax.Array:
+        return carry[1] & (carry[0] < MAXIMAL_STEPS)
+
+    qacc, motion = jnp.zeros_like(joints.force), jnp.zeros((3, *moving.turning.shape), bodies.dtype)
+    start: tuple[jax.Array, ...] = (contact_residuals(touching, motion), limit_residuals(stops, qacc), qacc, motion)
+    start = (jnp.array(0), jnp.array(True), *start)
+    count, _, _, _, qacc, motion = jax.lax.while_loop(unsettled, step, start)
+    return Solution(qacc, contact_residuals(touching, motion), limit_residuals(stops, qacc), count)
+
+
+def _any(flags: jax.Array) -> jax.Array:
+    return jnp.any(flags.any(tuple(range(flags.ndim - 1))))
