@@ -31,7 +31,7 @@ quality: $(INSTALLED)  ## how good the found policies are against the exact fron
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium,mjx,video]'
 	touch $@
 
 clean:

@@ -1,33 +1,39 @@
 """Multi-objective environments in pure JAX, by their MO-Gymnasium ids.
 
 `envs.make(id)` gives one, `envs.ids()` lists them, `envs.register` adds yours; `envs.make("module:id")` imports the
-module that does so.
+module that does so. An id may carry options of its environment: `envs.make("mo-halfcheetah-v5,physics=mjx")`.
 """
 
 import importlib
+import inspect
 from collections.abc import Callable
 from typing import Any
 
 from envs.core import Environment, EpisodeState, Objective, Step, Transition
+from envs.half_cheetah import HalfCheetah
 from envs.mountain_car import MountainCar
 
-__all__ = ["Environment", "EpisodeState", "Objective", "Step", "Transition", "ids", "make", "register"]
+__all__ = ["Environment", "EpisodeState", "Objective", "Step", "Transition", "ids", "make", "plain_id", "register"]
 
-_registry: dict[str, Callable[[], Environment[Any]]] = {}
+_registry: dict[str, Callable[..., Environment[Any]]] = {}
 
 
-def register(id: str, factory: Callable[[], Environment[Any]]) -> None:
-    """Make `factory` available as `make(id)`. Raises ValueError if the id is taken by another factory."""
+def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
+    """Make `factory` available as `make(id)`; its parameters are the environment's options.
+
+    Raises ValueError if the id is taken by another factory.
+    """
     if _registry.setdefault(id, factory) is not factory:
         raise ValueError(f"environment id {id!r} is already registered")
 
 
-def make(id: str) -> Environment[Any]:
+def make(id: str, **options: Any) -> Environment[Any]:
     """The environment called `id`; `module:id` imports `module`, which registers it, first.
 
-    Raises ValueError, naming the module or the known ids, if there is none.
+    `id,option=value` is another way to give options, as texts. Raises ValueError, naming what is known, for a module,
+    an id or an option that there is none of, and for a value that the environment refuses.
     """
-    module, _, name = id.rpartition(":")
+    module, name, written = _parts(id)
     if module:
         try:
             importlib.import_module(module)
@@ -35,7 +41,12 @@ def make(id: str) -> Environment[Any]:
             raise ValueError(f"environment {id!r}: cannot import {module!r}: {error}") from error
     if name not in _registry:
         raise ValueError(f"unknown environment {name!r}; known: {', '.join(ids())}")
-    return _registry[name]()
+    factory, options = _registry[name], written | options
+    known = list(inspect.signature(factory).parameters)
+    for option in options:
+        if option not in known:
+            raise ValueError(f"environment {name!r} has no option {option!r}; known: {', '.join(known) or 'none'}")
+    return factory(**options)
 
 
 def ids() -> list[str]:
@@ -43,4 +54,20 @@ def ids() -> list[str]:
     return sorted(_registry)
 
 
+def plain_id(id: str) -> str:
+    """The id without module and options: what MO-Gymnasium calls the environment."""
+    return id.partition(",")[0].rpartition(":")[2]
+
+
+def _parts(id: str) -> tuple[str, str, dict[str, str]]:
+    """Module, plain id and options of an id as written."""
+    place, *options = id.split(",")
+    module = place.rpartition(":")[0]
+    pairs = [option.partition("=") for option in options]
+    if not all(option and equals for option, equals, _ in pairs):
+        raise ValueError(f"environment {id!r}: an option is written name=value, after a comma")
+    return module, plain_id(id), {option: value for option, _, value in pairs}
+
+
 register(MountainCar.id, MountainCar)
+register(HalfCheetah.id, HalfCheetah)

@@ -3,7 +3,8 @@
 A new environment subclasses `Environment` and writes three pure functions of *one* state:
 `initial_state`, `observe` and `transition`. This module adds what every environment shares:
 the time limit, the reset within the same step, and the separation of `terminated`,
-`truncated` and the final observation. Callers batch with `jax.vmap`.
+`truncated` and the final observation. Callers batch with `jax.vmap`. An environment that can be
+seen writes a fourth, `scene`, for the host.
 
 Shape letters: O observation size, A action size, M objectives.
 """
@@ -15,6 +16,8 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 import jax
 import jax.numpy as jnp
 from flax import struct
+
+from envs.drawing import NoDrawing, Scene
 
 PhysicsState = TypeVar("PhysicsState")
 
@@ -77,6 +80,7 @@ class Environment(ABC, Generic[PhysicsState]):
     action_low: ClassVar[float] = -1.0
     action_high: ClassVar[float] = 1.0
     time_limit: ClassVar[int]
+    step_seconds: ClassVar[float | None] = None  # simulated time of a step, where steps have a duration
 
     @abstractmethod
     def initial_state(self, key: jax.Array) -> PhysicsState:
@@ -89,6 +93,10 @@ class Environment(ABC, Generic[PhysicsState]):
     @abstractmethod
     def transition(self, state: PhysicsState, action: jax.Array) -> Transition:
         """The dynamics: state and action [A] to successor, vector reward and termination."""
+
+    def scene(self, state: PhysicsState) -> Scene:
+        """A state as a picture, on the host. Raises NoDrawing for an environment that has none."""
+        raise NoDrawing(f"environment {self.id!r} has no drawing")
 
     def reset(self, key: jax.Array) -> tuple[EpisodeState[PhysicsState], jax.Array]:
         """Start an episode. Returns its state and first observation [O]."""

@@ -1,8 +1,10 @@
-"""An `Environment` behind MO-Gymnasium's API: for its wrappers, its algorithms, and anything made for Gymnasium.
+"""An `Environment` behind MO-Gymnasium's API, and MO-Gymnasium's own environment of the same id.
 
-Needs the `gymnasium` extra. Time limit and vector reward come with the environment, so no wrapper is needed.
+The first is for its wrappers, its algorithms, and anything made for Gymnasium; time limit and vector reward come with
+the environment, so no wrapper is needed. The second is to compare with. Needs the `gymnasium` extra.
 """
 
+import warnings
 from typing import Any
 
 import gymnasium
@@ -10,7 +12,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from envs import plain_id
 from envs.core import Environment
+from envs.mujoco_model import quiet_mujoco
 
 
 class GymnasiumEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -50,3 +54,15 @@ class GymnasiumEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         self._state, step = self._advance(self._state, jnp.asarray(action, jnp.float32))
         observation, reward = np.array(step.final_observation), np.array(step.reward)
         return observation, reward, bool(step.terminated), bool(step.truncated), {}
+
+
+def original(id: str) -> Any:
+    """MO-Gymnasium's environment that `envs.make(id)` is the counterpart of, with its time limit; options are ours.
+
+    Raises gymnasium.error.Error if MO-Gymnasium has none of that id, and ImportError if what it needs is missing.
+    """
+    with warnings.catch_warnings(), quiet_mujoco():
+        warnings.simplefilter("ignore")  # about versions and precision; nothing that a user of ours can change
+        import mo_gymnasium
+
+        return mo_gymnasium.make(plain_id(id))

@@ -8,15 +8,18 @@ from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 
 from envs.core import Environment, Objective, Transition
+from envs.drawing import Disk, Point, Polygon, Polyline, Scene, Shape, Window
 
 POWER = 0.0015
 GRAVITY = 0.0025
 MAX_SPEED = 0.07
 LEFT_WALL, RIGHT_WALL = -1.2, 0.6
 GOAL_POSITION = 0.45
+VALLEY = Window((-1.3, 0.7), (0.0, 1.25))
 
 
 @struct.dataclass
@@ -50,3 +53,39 @@ class MountainCar(Environment[CarState]):
         terminated = (position >= GOAL_POSITION) & (velocity >= 0)
         reward = jnp.stack([jnp.where(terminated, 0.0, -1.0), -(force**2)])
         return Transition(CarState(position, velocity), reward, terminated)
+
+    def scene(self, state: CarState) -> Scene:
+        """The whole valley, the flag, and the car upright on the slope."""
+        x = np.linspace(*VALLEY.x, 101)
+        hill = tuple(zip(x.tolist(), _height(x).tolist(), strict=True))
+        (left, right), bottom = VALLEY.x, VALLEY.z[0]
+        wall, foot = (LEFT_WALL, float(_height(LEFT_WALL))), (GOAL_POSITION, float(_height(GOAL_POSITION)))
+        top = (foot[0], foot[1] + 0.17)
+        pennant = (top, (foot[0] + 0.09, foot[1] + 0.14), (foot[0], foot[1] + 0.11))
+        valley = (
+            Polygon((*hill, (right, bottom), (left, bottom)), "ground"),
+            Polyline(hill, "mark"),
+            Polyline((wall, (wall[0], wall[1] + 0.2)), "mark"),
+            Polyline((foot, top), "mark"),
+            Polygon(pennant, "goal"),
+        )
+        return Scene((*valley, *_car(float(state.position))), VALLEY)
+
+
+def _height(position: np.ndarray | float) -> np.ndarray:
+    """The valley, as Gymnasium draws it."""
+    return np.asarray(np.sin(3 * np.asarray(position)) * 0.45 + 0.55)
+
+
+def _car(position: float) -> tuple[Shape, ...]:
+    slope = np.arctan(1.35 * np.cos(3 * position))
+    along, upwards = np.array([np.cos(slope), np.sin(slope)]), np.array([-np.sin(slope), np.cos(slope)])
+    ground = np.array([position, float(_height(position))])
+
+    def point(a: float, b: float) -> Point:
+        x, z = ground + a * along + b * upwards
+        return float(x), float(z)
+
+    outline = [(-0.075, 0.025), (0.075, 0.025), (0.075, 0.06), (0.03, 0.07), (0.015, 0.105), (-0.06, 0.105)]
+    body = Polygon(tuple(point(*corner) for corner in outline), "body")
+    return body, Disk(point(-0.042, 0.026), 0.026, "body"), Disk(point(0.042, 0.026), 0.026, "body")

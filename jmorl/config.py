@@ -38,7 +38,7 @@ class ConfigError(ValueError):
 class Section(pydantic.BaseModel):
     """A group of settings: immutable, hashable, unknown names refused."""
 
-    model_config = pydantic.ConfigDict(frozen=True, extra="forbid")
+    model_config = pydantic.ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -132,7 +132,7 @@ class SearchConfig(Section):
 class Config(Section):
     """One run."""
 
-    env: str = Field("mo-mountaincarcontinuous-v0", description="environment id; see `jmorl envs`")
+    env: str = Field("mo-mountaincarcontinuous-v0", description="environment id, `ID,option=value`; see `jmorl envs`")
     method: Literal["interactive", "pgmorl"] = Field(
         "interactive", description="ask every generation, or only at the end"
     )
@@ -256,7 +256,7 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
             problems.append(f"config: cannot read {file}: {error}")
     chosen = _merged(from_file, overrides or {})
     env = chosen.get("env", Config.model_fields["env"].default)
-    base = PRESETS.get(preset, {}).get(env, {}) if isinstance(env, str) else {}
+    base = PRESETS.get(preset, {}).get(envs.plain_id(env), {}) if isinstance(env, str) else {}
     return _validated(Config, _merged(base, chosen), problems)
 
 

@@ -116,6 +116,24 @@ def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Tabl
     return table
 
 
+def comparison_table(header: Mapping[str, Any], ours: np.ndarray, theirs: np.ndarray, z: np.ndarray) -> Table:
+    """Returns [N, M] here and in MO-Gymnasium, side by side; `z` [M] is the difference in standard errors."""
+    spread = "std.\ndev.", "std.\nerror"
+    headings = "jmorl\nmean", *spread, "MO-Gym.\nmean", *spread, "difference in\nstd. errors"
+    table = plain_table("\nobjective", *headings)
+    table.title = f"Policy {header['id']} in {header['environment']}, {plural(len(ours), 'fresh episode')} each"
+    for index, fields in enumerate(header["objectives"]):
+        cells = [cell for returns in (ours, theirs) for cell in _mean_and_errors(returns[:, index])]
+        table.add_row(objective_label(Objective(**fields)), *cells, *_texts(z[index : index + 1], "+.1f"))
+    return table
+
+
+def _mean_and_errors(column: np.ndarray) -> list[str]:
+    fmt = number_format(column)
+    deviation = column.std(ddof=1) if len(column) > 1 else np.nan
+    return [f"{column.mean():{fmt}}", *_texts(np.array([deviation, deviation / np.sqrt(len(column))]), ".3g")]
+
+
 def environments_table() -> Table:
     """One row for each environment: what it optimises, and its sizes."""
     table = plain_table("\nenvironment", "\nobjectives", "obser-\nvations", "\nactions", "time\nlimit")

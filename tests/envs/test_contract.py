@@ -1,11 +1,14 @@
 """What every registered environment promises."""
 
+import json
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import envs
+from envs.drawing import NoDrawing
 
 STEPS = 60
 
@@ -58,12 +61,15 @@ def test_same_key_same_episode_other_key_another(environment):
 
 
 def test_vmap_equals_a_loop(environment):
-    keys = jax.random.split(jax.random.key(3), 5)
-    batched = jax.jit(jax.vmap(lambda key: random_episode(environment, key)))(keys)
-    single = jax.jit(lambda key: random_episode(environment, key))
-    for index, key in enumerate(keys):
-        for together, alone in zip(jax.tree.leaves(batched), jax.tree.leaves(single(key)), strict=True):
-            np.testing.assert_allclose(together[index], alone, rtol=1e-4, atol=1e-5)
+    """Step by step from the same states: what is chaotic may drift apart over an episode."""
+    (start, _), (states, _) = random_episode(environment, jax.random.key(3))
+    before = jax.tree.map(lambda first, after: jnp.concatenate([first[None], after[:-1]]), start, states)
+    actions = random_actions(environment, jax.random.key(4), STEPS)
+    inputs = jax.random.split(jax.random.key(5), STEPS), before, actions
+    together = jax.jit(jax.vmap(environment.step))(*inputs)
+    alone = jax.jit(lambda inputs: jax.lax.map(lambda each: environment.step(*each), inputs))(inputs)
+    for left, right in zip(jax.tree.leaves(together), jax.tree.leaves(alone), strict=True):
+        np.testing.assert_allclose(left, right, rtol=1e-3, atol=1e-3)
 
 
 def test_truncates_exactly_at_the_time_limit(environment):
@@ -108,3 +114,15 @@ def test_actions_are_clipped(environment):
     _, beyond = environment.advance(state, 3 * limit)
     for left, right in zip(at_limit, beyond, strict=True):
         np.testing.assert_array_equal(left, right)
+
+
+def test_a_drawing_is_finite_or_refused_by_name(environment):
+    (start, _), _ = random_episode(environment, jax.random.key(10))
+    state = jax.device_get(start.physics)
+    if type(environment).scene is envs.Environment.scene:
+        with pytest.raises(NoDrawing, match=environment.id):
+            environment.scene(state)
+    else:
+        scene = environment.scene(state)
+        assert json.loads(json.dumps(scene.to_json(), allow_nan=False))["shapes"]
+        assert scene.window.x[0] < scene.window.x[1] and scene.window.z[0] < scene.window.z[1]

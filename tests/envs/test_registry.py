@@ -24,6 +24,37 @@ def test_a_module_that_is_not_there_is_named():
         envs.make("no_such_module:x")
 
 
+@pytest.mark.parametrize(
+    ("id", "message"),
+    [
+        ("mo-halfcheetah-v5,gravity=1", "'mo-halfcheetah-v5' has no option 'gravity'; known: physics"),
+        ("mo-mountaincarcontinuous-v0,a=1", "has no option 'a'; known: none"),
+        ("mo-halfcheetah-v5,physics", "an option is written name=value"),
+        ("mo-halfcheetah-v5,=mjx", "an option is written name=value"),
+        ("mo-halfcheetah-v5,", "an option is written name=value"),
+    ],
+)
+def test_an_option_that_is_not_there_or_not_written_so_is_refused(id, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        envs.make(id)
+
+
+def test_options_reach_the_factory_from_the_id_and_from_the_call(monkeypatch):
+    class Sized(MountainCar):
+        def __init__(self, size="1", colour="red"):
+            self.made = size, colour
+
+    monkeypatch.setattr(envs, "_registry", {"sized": Sized})
+    assert envs.make("sized").made == ("1", "red")
+    assert envs.make("tests:sized,size=3").made == ("3", "red")
+    assert envs.make("sized,size=3,colour=blue", size="4").made == ("4", "blue")
+
+
+@pytest.mark.parametrize("id", ["a-v0", "module.sub:a-v0", "a-v0,x=1", "module:a-v0,x=1,y=m:2"])
+def test_the_plain_id_is_without_module_and_options(id):
+    assert envs.plain_id(id) == "a-v0"
+
+
 def test_an_id_is_taken_once():
     envs.register(MountainCar.id, MountainCar)  # the same again is fine
     with pytest.raises(ValueError, match="already registered"):

@@ -8,7 +8,7 @@ from rich.console import Console
 
 import envs
 from jmorl.learning.rollout import EpisodeReturns
-from jmorl.report.tables import environments_table, evaluation_table, run_tables
+from jmorl.report.tables import comparison_table, environments_table, evaluation_table, run_tables
 
 
 def printed(renderables, width=80):
@@ -122,6 +122,20 @@ def test_a_single_episode_has_no_standard_error():
     returns = EpisodeReturns(np.array([[2.0]]), np.array([[1.5]]), np.array([7]))
     text = printed([evaluation_table(header, returns)])
     assert "Policy 1 in 1 fresh episode of e" in text and "nan" not in text
+
+
+def test_two_evaluations_side_by_side():
+    generator = np.random.default_rng(2)
+    ours, theirs = generator.normal([-70, -40], [2, 5], (50, 2)), generator.normal([-70, -40], [2, 5], (50, 2))
+    environment = envs.make("mo-mountaincarcontinuous-v0")
+    header = {"id": 17, "environment": environment.id, "objectives": [vars(each) for each in environment.objectives]}
+    text = printed([comparison_table(header, ours, theirs, np.array([1.25, np.nan]))], width=88)
+    assert max(map(len, text.splitlines())) <= 88 and "nan" not in text
+    rows = [line.split() for line in text.splitlines() if "(-" in line]
+    for row, *columns in zip(rows, ours.T, theirs.T, strict=True):
+        expected = [n for c in columns for n in (c.mean(), np.std(c, ddof=1), np.std(c, ddof=1) / np.sqrt(50))]
+        assert [float(word) for word in row[2:8]] == pytest.approx(expected, rel=0.01)
+    assert rows[0][8:] == ["+1.2"] and rows[1][8:] == []
 
 
 def test_every_environment_is_listed():
