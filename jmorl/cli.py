@@ -24,9 +24,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command. Returns the exit code; argparse itself exits with 2 for unknown flags."""
     options = _parser().parse_args(arguments)
     sys.path.insert(0, os.getcwd())  # for an environment of one's own, as `--env my_module:my-env-v0`
+    from envs.drawing import NoDrawing
     from jmorl.decision.records import ScriptError
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
+    from jmorl.playback import PlaybackError
+    from jmorl.scoring import NotInGymnasium
     from jmorl.storage.policy_file import PolicyFileError
     from jmorl.storage.run_folder import FolderInUse
     from jmorl.storage.stored_run import StoredRunError
@@ -36,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.command(options)
     except ConfigError as error:
         return _failed(error.problems, EXIT_BAD_INPUT)
-    except (FolderInUse, PolicyFileError, StoredRunError) as error:
+    except (FolderInUse, NoDrawing, NotInGymnasium, PlaybackError, PolicyFileError, StoredRunError) as error:
         return _failed([str(error)], EXIT_BAD_INPUT)
     except (TrainingFault, ScriptError, EOFError, OSError) as error:
         return _failed([f"the run stopped: {error}"], EXIT_FAILED)
@@ -121,20 +124,43 @@ def _overrides(options: argparse.Namespace) -> dict[str, Any]:
 
 def _evaluate(options: argparse.Namespace) -> None:
     import jax
+    import numpy as np
     from rich.console import Console
 
-    from jmorl.report.tables import evaluation_table
-    from jmorl.scoring import evaluate_stored
-    from jmorl.storage.policy_file import load_policy
+    from jmorl.report.tables import comparison_table, evaluation_table
+    from jmorl.scoring import difference_in_errors, evaluate_in_gymnasium, evaluate_stored
+    from jmorl.storage.policy_file import load_policy, policy_path
 
-    path = options.policy / "chosen.npz" if options.policy.is_dir() else options.policy
+    path = policy_path(options.policy, options.id)
     policy = load_policy(path)
-    keys = jax.random.split(jax.random.key(options.seed), options.episodes)
-    returns = evaluate_stored(policy, keys)
+    theirs = evaluate_in_gymnasium(policy, options.episodes, options.seed) if options.where else None
+    returns = evaluate_stored(policy, jax.random.split(jax.random.key(options.seed), options.episodes))
+    ours = np.asarray(returns.undiscounted, np.float64)
+    printed = {"policy": str(path), "seed": options.seed, "returns": ours.tolist()}
+    table = evaluation_table(policy.header, returns)
+    if theirs is not None:
+        z = difference_in_errors(ours, theirs)
+        differences = [None if np.isnan(value) else float(value) for value in z]
+        printed[options.where] = {"returns": theirs.tolist(), "difference_in_standard_errors": differences}
+        table = comparison_table(policy.header, ours, theirs, z)
     if options.json:
-        print(json.dumps({"policy": str(path), "seed": options.seed, "returns": returns.undiscounted.tolist()}))
+        print(json.dumps(printed))
     else:
-        Console().print(evaluation_table(policy.header, returns))
+        Console().print(table)
+
+
+def _play(options: argparse.Namespace) -> None:
+    import jax
+
+    from jmorl.playback import record
+    from jmorl.report.playback import check_playback, write_playback
+    from jmorl.storage.policy_file import load_policy, policy_path
+
+    check_playback(options.out, options.force)
+    policy = load_policy(policy_path(options.policy, options.id))
+    recording = record(policy, jax.random.split(jax.random.key(options.seed), 1)[0], options.steps)
+    write_playback(recording, options.out, options.size)
+    print(f"{options.out}: {recording.steps} steps of policy {policy.header['id']}")
 
 
 def _enautilus(options: argparse.Namespace) -> None:
@@ -197,11 +223,21 @@ def _parser() -> argparse.ArgumentParser:
     enautilus.set_defaults(command=_enautilus)
 
     evaluate = commands.add_parser("evaluate", help="score a saved policy on fresh episodes")
-    evaluate.add_argument("policy", type=Path, metavar="POLICY", help="policy file, or a run folder for its choice")
+    _add_policy(evaluate)
+    evaluate.add_argument("--in", dest="where", choices=["gymnasium"], help="also in MO-Gymnasium, side by side")
     evaluate.add_argument("--episodes", type=_count, default=100, help="default: 100")
     evaluate.add_argument("--seed", type=int, default=0, help="of the start states (default: 0)")
     evaluate.add_argument("--json", action="store_true", help="print every episode's returns as JSON")
     evaluate.set_defaults(command=_evaluate)
+
+    play = commands.add_parser("play", help="draw an episode of a saved policy: animation, film, or strip of poses")
+    _add_policy(play)
+    play.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .png (a strip)")
+    play.add_argument("--seed", type=int, default=0, help="of the start state, as in evaluate (default: 0)")
+    play.add_argument("--steps", type=_count, help="at most so many (default: the whole episode)")
+    play.add_argument("--size", type=_size, metavar="PIXELS", help="width (default: 640, for a strip 1280)")
+    play.add_argument("--force", action="store_true", help="overwrite the file")
+    play.set_defaults(command=_play)
 
     show = commands.add_parser("show", help="print a run's tables and draw its plots")
     show.add_argument("run", type=Path, metavar="RUN", help="run folder")
@@ -229,6 +265,11 @@ def _add_train(commands: Any) -> None:
     _add_settings(train, train.add_argument_group("settings"), Config, "")
 
 
+def _add_policy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("policy", type=Path, metavar="RUN_OR_POLICY", help="run folder, or policy file")
+    parser.add_argument("--policy", dest="id", type=int, metavar="ID", help="of a run folder (default: its choice)")
+
+
 def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Section], prefix: str) -> None:
     """One flag for every field. Values stay strings here, so that the config can name all problems at once."""
     for name, field in section.model_fields.items():
@@ -251,6 +292,13 @@ def _count(text: str) -> int:
     number = int(text)
     if number < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1, not {number}")
+    return number
+
+
+def _size(text: str) -> int:
+    number = int(text)
+    if not 160 <= number <= 4096:
+        raise argparse.ArgumentTypeError(f"must be from 160 to 4096, not {number}")
     return number
 
 

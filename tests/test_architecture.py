@@ -16,6 +16,7 @@ MAY_IMPORT = {
     "jmorl.config": {"envs", "jmorl.decision"},
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
+    "jmorl.playback": {"envs", "jax", "jmorl.storage"},
     "jmorl.run": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search")
     },
@@ -23,8 +24,8 @@ MAY_IMPORT = {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search")
     },
     "jmorl.report": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.run"),
-        *("jmorl.search", "jmorl.storage"),
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
+        *("jmorl.run", "jmorl.search", "jmorl.storage"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}

@@ -83,6 +83,22 @@ def save_policy(path: Path, policy: Policy, environment: Environment[Any], confi
         np.savez(file, **arrays)
 
 
+def policy_path(place: Path, policy_id: int | None = None) -> Path:
+    """Where a policy is: `place` itself if it is a file; of a run folder its choice, or the policy of an id.
+
+    Raises PolicyFileError if there is none.
+    """
+    if not place.is_dir():
+        if policy_id is not None:
+            raise PolicyFileError(f"{place} is no run folder, so it has no policy {policy_id}")
+        return place
+    path = place / ("chosen.npz" if policy_id is None else f"policies/{policy_id:05d}.npz")
+    if not path.exists():
+        what = "chosen policy; name one by its id" if policy_id is None else f"policy {policy_id}; see its policies/"
+        raise PolicyFileError(f"{place} has no {what}")
+    return path
+
+
 def load_policy(path: Path | str) -> StoredPolicy:
     """Read a policy. Raises PolicyFileError, naming the file, if it is not one that can be read."""
     try:
