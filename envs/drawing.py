@@ -11,6 +11,7 @@ from math import ceil, floor
 from typing import Any, Literal
 
 Point = tuple[float, float]  # x, z
+LABEL_MARGIN = 0.3  # metres, half of a label's width and some more
 Part = Literal[
     "ground",  # what is stood on
     "stripe",  # every other stretch of it, so that motion shows
@@ -101,7 +102,8 @@ def level_ground(window: Window) -> Iterator[Shape]:
     for x in range(floor(left), ceil(right) + 1):
         if x % 2 and x < right:
             yield _below(max(x, left), min(x + 1, right), bottom, "stripe")
-        yield Label((x, bottom / 2), f"{x} m", "mark")
+        if left + LABEL_MARGIN < x < right - LABEL_MARGIN:  # a label is shown whole or not at all
+            yield Label((x, bottom / 2), f"{x} m", "mark")
     yield Polyline(((left, 0.0), (right, 0.0)), "mark")
 
 

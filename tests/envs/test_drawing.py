@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import envs
-from envs.drawing import Capsule, Disk, Label, Polygon, Polyline, Window, level_ground
+from envs.drawing import LABEL_MARGIN, Capsule, Disk, Label, Polygon, Polyline, Window, level_ground
 from envs.mountain_car import GOAL_POSITION, CarState
 from envs.physics import BodyState
 
@@ -62,8 +62,8 @@ def test_marks_on_the_ground_stand_at_their_distance(left):
     ground = list(level_ground(window))
     labels = [shape for shape in ground if isinstance(shape, Label)]
     assert {label.text for label in labels} == {f"{label.centre[0]:.0f} m" for label in labels}
-    inside = [x for x in range(-10, 10_010) if left <= x <= left + 4.0]
-    assert set(inside) <= {label.centre[0] for label in labels}
+    whole = {x for x in range(-10, 10_010) if left + LABEL_MARGIN < x < left + 4.0 - LABEL_MARGIN}
+    assert {label.centre[0] for label in labels} == whole
     for stripe in (shape for shape in ground if isinstance(shape, Polygon) and shape.part == "stripe"):
         middle = np.mean([x for x, _ in stripe.points])
         assert np.floor(middle) % 2 == 1
