@@ -117,7 +117,7 @@ def contact_forces(touching: Contacts, residuals: jax.Array) -> jax.Array:
 def limit_forces(stops: Limits, residuals: jax.Array) -> jax.Array:
     """The limits' joint forces [V, batch]."""
     force = -stops.direction * stops.strength * jnp.minimum(residuals, 0.0)
-    return jnp.concatenate([jnp.zeros_like(force[:2]), force])
+    return jnp.concatenate([jnp.zeros((2, force.shape[-1]), force.dtype), force])
 
 
 def _impedance(constraints: Constraints, depth: jax.Array) -> jax.Array:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from envs.planar.support import collide, unsupported
+from envs.planar.support import capsule_axis, collide, prevailing, unsupported
 
 FAR = 1e6  # radians or metres: a limit that is never reached, and finite so that it never makes a NaN
 # MuJoCo's bounds of solimp: least, greatest, width, midpoint, power.
@@ -142,7 +142,8 @@ def _slots(model: mujoco.MjModel, slots: list[_Slot]) -> dict[str, Any]:
     bodies = [slot.body for slot in slots]
     capsules = [floor if slot.capsule is None else slot.capsule for slot in slots]
     radius = [-FAR if slot.capsule is None else model.geom_size[slot.capsule, 0] for slot in slots]
-    friction = np.maximum(LEAST_FRICTION, [_friction(model, capsule, floor) for capsule in capsules])
+    sliding = [prevailing(model, model.geom_friction[:, 0], capsule, floor) for capsule in capsules]
+    friction = np.maximum(LEAST_FRICTION, sliding)
     return {
         "slot_centre": np.stack([_centre(model, body) for body in bodies], axis=-1),
         "slot_ends": np.stack([_ends(model, slot) for slot in slots], axis=-1),
@@ -249,9 +250,7 @@ def _ends(model: mujoco.MjModel, slot: _Slot) -> np.ndarray:
     """Capsule ends [2, 2 ends] in the frame of the body's hinge."""
     if slot.capsule is None:
         return np.zeros((2, 2))
-    rotation = np.zeros(9)
-    mujoco.mju_quat2Mat(rotation, model.geom_quat[slot.capsule])
-    half = _plane(rotation.reshape(3, 3)[:, 2]) * model.geom_size[slot.capsule, 1]
+    half = _plane(capsule_axis(model, slot.capsule)) * model.geom_size[slot.capsule, 1]
     middle = _plane(model.geom_pos[slot.capsule]) - _plane(model.jnt_pos[_hinge(model, slot.body)])
     return np.stack([middle + half, middle - half], axis=-1)
 
@@ -279,13 +278,6 @@ def _share(model: mujoco.MjModel, one: int, other: int) -> float:
     mix = model.geom_solmix
     total = mix[one] + mix[other]
     return float(mix[one] / total) if total > 0 else 0.5
-
-
-def _friction(model: mujoco.MjModel, one: int, other: int) -> float:
-    """Sliding friction: of the geom with priority, else the greater."""
-    share = _share(model, one, other) if model.geom_priority[one] != model.geom_priority[other] else None
-    of_one, of_other = (float(model.geom_friction[geom, 0]) for geom in (one, other))
-    return max(of_one, of_other) if share is None else share * of_one + (1 - share) * of_other
 
 
 def _constraints(option: mujoco.MjOption, solref: np.ndarray, solimp: np.ndarray, diagonal: np.ndarray) -> Constraints:

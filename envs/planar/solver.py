@@ -25,8 +25,9 @@ from envs.planar.kinematics import Kinematics
 from envs.planar.model import Level, PlanarModel
 from envs.planar.tree import constant, pick, total
 
-FULL_STEPS = 8  # of Newton; what cycles longer takes half steps
+FULL_STEPS = 8  # of Newton; whatever goes on longer may be cycling, and minds the cost from then on
 MAXIMAL_STEPS = 40
+HALVINGS = 12  # of a step that passes the least cost
 
 
 class Joints(NamedTuple):
@@ -61,7 +62,7 @@ def accelerations(
         eliminated.append(hinge)
         carried = total(_reduced(whole, hinge), level.parent, model.levels[depth - 1].count)
     root = model.levels[0]
-    motion = _root_motion(_bodies(bodies, root) + carried, joints)
+    motion = _root_motion(model, _bodies(bodies, root) + carried, joints)
     motions = [motion]
     qacc = [motion[1], motion[2], constant(model.hinge_sign[:1], motion) * motion[0]]
     for depth, level in enumerate(model.levels[1:], start=1):
@@ -118,11 +119,12 @@ def _reduced(whole: jax.Array, hinge: _Hinge) -> jax.Array:
     return whole - left * (right * inverse)
 
 
-def _root_motion(whole: jax.Array, joints: Joints) -> jax.Array:
+def _root_motion(model: PlanarModel, whole: jax.Array, joints: Joints) -> jax.Array:
     """The root's (w, u, v) [3, 1, batch] from what it resists and feels [9, 1, batch]: a 3x3 solve, v first."""
     ww, wu, wv, uu, uv, vv, moment, force_x, force_z = whole
     uu, vv, ww = uu + joints.inertia[0:1], vv + joints.inertia[1:2], ww + joints.inertia[2:3]
-    force_x, force_z, moment = force_x + joints.force[0:1], force_z + joints.force[1:2], moment + joints.force[2:3]
+    force_x, force_z = force_x + joints.force[0:1], force_z + joints.force[1:2]
+    moment = moment + constant(model.hinge_sign[:1], whole) * joints.force[2:3]
     by_v = 1 / vv
     ww, wu, uu = ww - wv * wv * by_v, wu - wv * uv * by_v, uu - uv * uv * by_v
     moment, force_x = moment - wv * force_z * by_v, force_x - uv * force_z * by_v
@@ -142,6 +144,15 @@ class Solution(NamedTuple):
     steps: jax.Array  # [] of Newton, until no active set changed in the whole batch
 
 
+class _Point(NamedTuple):
+    """Accelerations on Newton's way, and all that is linear in them."""
+
+    qacc: jax.Array  # [V, batch]
+    motion: jax.Array  # [3, slots, batch]
+    contact: jax.Array  # [3, 2 ends, slots, batch] residuals
+    limit: jax.Array  # [V - 2, batch] residuals
+
+
 def constrained(
     model: PlanarModel,
     moving: Kinematics,
@@ -153,35 +164,75 @@ def constrained(
     """Newton's method from zero acceleration, with full steps.
 
     A full step depends on the active rows alone, so a state whose active rows no longer change has arrived, exactly,
-    and stays where it is while the rest of the batch goes on. Full steps may cycle in principle: after `FULL_STEPS`
-    they are halved, until the active rows are those of the step's own end.
+    and stays where it is while the rest of the batch goes on. Full steps may cycle: after `FULL_STEPS` each is halved
+    until the cost still falls at its end, and as the cost is convex, they arrive.
     """
 
-    def step(carry: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
-        count, _, contact, limit, *_ = carry
-        held = jnp.where(limit < 0, stops.strength, 0.0)
+    def point(qacc: jax.Array, motion: jax.Array) -> _Point:
+        return _Point(qacc, motion, contact_residuals(touching, motion), limit_residuals(stops, qacc))
+
+    def step(carry: tuple[jax.Array, jax.Array, _Point]) -> tuple[jax.Array, jax.Array, _Point]:
+        count, _, start = carry
+        held = jnp.where(start.limit < 0, stops.strength, 0.0)
         none = jnp.zeros_like(joints.force[:2])
         diagonal = joints.inertia + jnp.concatenate([none, held])
         force = joints.force + jnp.concatenate([none, stops.direction * held * stops.reference])
-        stiff = bodies + contact_stiffness(touching, contact < 0)
-        qacc, motion = accelerations(model, moving.anchors, stiff, Joints(diagonal, force))
-        contact_end, limit_end = contact_residuals(touching, motion), limit_residuals(stops, qacc)
-        changed = _any(((contact_end < 0) != (contact < 0)) & (touching.strength > 0)) | _any(
-            ((limit_end < 0) != (limit < 0)) & (stops.strength > 0)
+        stiff = bodies + contact_stiffness(touching, start.contact < 0)
+        end = point(*accelerations(model, moving.anchors, stiff, Joints(diagonal, force)))
+        changed = _any(((end.contact < 0) != (start.contact < 0)) & (touching.strength > 0)) | _any(
+            ((end.limit < 0) != (start.limit < 0)) & (stops.strength > 0)
         )
-        full = count < FULL_STEPS
-        contact = jnp.where(full, contact_end, 0.5 * (contact + contact_end))
-        limit = jnp.where(full, limit_end, 0.5 * (limit + limit_end))
-        return count + 1, changed, contact, limit, qacc, motion
+        back = jax.lax.cond(
+            count < FULL_STEPS,
+            lambda: jnp.zeros_like(end.qacc[0]),
+            lambda: 1 - _share(touching, stops, bodies, joints, start, end),
+        )
+        reached = [there + back * (here - there) for here, there in zip(start, end, strict=True)]
+        return count + 1, changed, _Point(*reached)
 
-    def unsettled(carry: tuple[jax.Array, ...]) -> jax.Array:
+    def unsettled(carry: tuple[jax.Array, jax.Array, _Point]) -> jax.Array:
         return carry[1] & (carry[0] < MAXIMAL_STEPS)
 
-    qacc, motion = jnp.zeros_like(joints.force), jnp.zeros((3, *moving.turning.shape), bodies.dtype)
-    start: tuple[jax.Array, ...] = (contact_residuals(touching, motion), limit_residuals(stops, qacc), qacc, motion)
-    start = (jnp.array(0), jnp.array(True), *start)
-    count, _, _, _, qacc, motion = jax.lax.while_loop(unsettled, step, start)
-    return Solution(qacc, contact_residuals(touching, motion), limit_residuals(stops, qacc), count)
+    still = point(jnp.zeros_like(joints.force), jnp.zeros_like(bodies[:3]))
+    begin = _any(jnp.ones_like(still.qacc, bool))  # true, and each device's own where the batch is spread over several
+    count, _, found = jax.lax.while_loop(unsettled, step, (jnp.array(0), begin, still))
+    return Solution(found.qacc, found.contact, found.limit, count)
+
+
+def _share(
+    touching: Contacts, stops: Limits, bodies: jax.Array, joints: Joints, start: _Point, end: _Point
+) -> jax.Array:  # [batch]
+    """How much of Newton's step from `start` to `end` to take: the most of 1, 1/2, 1/4, ... at which the cost falls.
+
+    The cost's slope along the step is the inertia's, linear in the share taken, and the rows', linear while active. It
+    would be zero at the end if the rows active at the start stayed the active ones.
+    """
+    qacc, motion, contact, limit = (there - here for here, there in zip(start, end, strict=True))
+    ww, wu, wv, uu, uv, vv = bodies[:6]
+    w, u, v = motion
+    inertia = _sum(w * (ww * w + 2 * (wu * u + wv * v)) + u * (uu * u + 2 * uv * v) + vv * v * v)
+    inertia = inertia + _sum(joints.inertia * qacc * qacc)
+    edges = jnp.array([1.0, 1.0, 2.0], contact.dtype)[:, None, None, None]  # n counts twice
+    contact, limit = edges * touching.strength * contact, stops.strength * limit
+
+    def rows(contact_residuals: jax.Array, limit_residuals: jax.Array) -> jax.Array:
+        return _sum(contact * contact_residuals) + _sum(limit * limit_residuals)
+
+    assumed = rows(jnp.where(start.contact < 0, end.contact, 0.0), jnp.where(start.limit < 0, end.limit, 0.0))
+
+    def slope(share: jax.Array) -> jax.Array:
+        at = [there + (1 - share) * (here - there) for here, there in zip(start, end, strict=True)]
+        active = rows(jnp.minimum(at[2], 0.0), jnp.minimum(at[3], 0.0))
+        return active - assumed - (1 - share) * inertia
+
+    def halve(_: jax.Array, share: jax.Array) -> jax.Array:
+        return jnp.where(slope(share) > 0, 0.5 * share, share)
+
+    return jax.lax.fori_loop(0, HALVINGS, halve, jnp.ones_like(inertia))
+
+
+def _sum(values: jax.Array) -> jax.Array:  # [..., batch] -> [batch]
+    return values.sum(tuple(range(values.ndim - 1)))
 
 
 def _any(flags: jax.Array) -> jax.Array:

@@ -39,6 +39,7 @@ NOT_COUNTED = {
     "ntendon": "tendons",
     "nflex": "flexible bodies",
     "npair": "explicit contact pairs",
+    "nexclude": "excluded contact pairs",
     "nmocap": "mocap bodies",
     "nplugin": "plugins",
     "nplastic": "plastic joints",
@@ -57,7 +58,7 @@ def name(model: mujoco.MjModel, kind: str, index: int) -> str:
     """How a person knows an object: `joint 'rootx'`, or its number."""
     if kind == "DOF":
         kind, index = "JOINT", int(model.dof_jntid[index])
-    text = mujoco.mj_id2name(model, mujoco.mjtObj[f"mjOBJ_{kind}"], index)
+    text = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), index)
     return f"{kind.lower()} {text!r}" if text else f"{kind.lower()} {index}"
 
 
@@ -65,6 +66,19 @@ def collide(model: mujoco.MjModel, one: int, other: int) -> bool:
     """Whether the types of two geoms let them touch."""
     kind, affinity = model.geom_contype, model.geom_conaffinity
     return bool(kind[one] & affinity[other]) or bool(kind[other] & affinity[one])
+
+
+def prevailing(model: mujoco.MjModel, values: np.ndarray, one: int, other: int) -> float:
+    """Which of two touching geoms' values their contact has: of the geom with priority, else the greater."""
+    priority = model.geom_priority[[one, other]]
+    return float(values[[one, other]][priority == priority.max()].max())
+
+
+def capsule_axis(model: mujoco.MjModel, geom: int) -> np.ndarray:  # [3]
+    """The direction of a capsule in the frame of its body."""
+    direction = np.zeros(3)
+    mujoco.mju_rotVecQuat(direction, np.array([0.0, 0.0, 1.0]), model.geom_quat[geom])
+    return direction
 
 
 def _options(model: mujoco.MjModel) -> Iterator[str]:
@@ -79,6 +93,8 @@ def _options(model: mujoco.MjModel) -> Iterator[str]:
         yield "a medium with density or viscosity"
     if option.noslip_iterations:
         yield "noslip iterations"
+    if option.disableactuator:
+        yield "disabled groups of actuators"
     for flags, harmless, kind in (
         (option.disableflags, HARMLESS_DISABLED, mujoco.mjtDisableBit),
         (option.enableflags, HARMLESS_ENABLED, mujoco.mjtEnableBit),
@@ -124,7 +140,7 @@ def _joints(model: mujoco.MjModel, body: int) -> Iterator[str]:
             yield f"{name(model, 'JOINT', joint)}: not a {'slide' if kind == slide else 'hinge'} along {axis}"
         if kind == slide and model.jnt_limited[joint]:
             yield f"{name(model, 'JOINT', joint)}: a limit on a slide"
-        if model.jnt_limited[joint] and (model.jnt_solref[joint] <= 0).any():
+        if (model.jnt_solref[joint] <= 0).any():
             yield f"{name(model, 'JOINT', joint)}: solref in direct form"
 
 
@@ -135,26 +151,31 @@ def _contacts(model: mujoco.MjModel) -> Iterator[str]:
         return
     floor = int(planes[0])
     for geom in range(model.ngeom):
-        body = model.geom_bodyid[geom]
-        if geom != floor and collide(model, geom, floor):
-            if body == 0 or model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
-                yield f"{name(model, 'GEOM', geom)}: not a moving capsule, and touches the ground"
-            elif not _turns_about_y(model.geom_quat[geom]):
-                yield f"{name(model, 'GEOM', geom)}: out of the plane (x, z)"
-            if max(model.geom_condim[geom], model.geom_condim[floor]) != 3:
-                yield f"{name(model, 'GEOM', geom)}: condim is not 3"
-            if (model.geom_solref[[geom, floor]] <= 0).any():
-                yield f"{name(model, 'GEOM', geom)}: solref in direct form"
+        if geom == floor or (model.geom_bodyid[geom] and collide(model, geom, floor)):
+            yield from (f"{name(model, 'GEOM', geom)}: {problem}" for problem in _ground_contact(model, geom, floor))
         for other in range(geom):
-            if _meet(model, geom, other):
-                yield f"{name(model, 'GEOM', other)} and {name(model, 'GEOM', geom)}: bodies that touch each other"
+            if floor not in (geom, other) and _meet(model, geom, other):
+                yield f"{name(model, 'GEOM', other)} and {name(model, 'GEOM', geom)}: geoms that touch each other"
+
+
+def _ground_contact(model: mujoco.MjModel, geom: int, floor: int) -> Iterator[str]:
+    if (model.geom_solref[geom] <= 0).any():
+        yield "solref in direct form"
+    if geom == floor:
+        return
+    if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
+        yield "not a capsule, and touches the ground"
+    elif abs(capsule_axis(model, geom)[1]) > 1e-12:
+        yield "out of the plane (x, z)"
+    if prevailing(model, model.geom_condim, geom, floor) != 3:
+        yield "condim is not 3"
 
 
 def _meet(model: mujoco.MjModel, one: int, other: int) -> bool:
-    """Whether two moving geoms may touch: not of one body, nor of a body and its parent."""
+    """Whether two geoms may touch: not of one body, nor of a body that moves and its parent."""
     a, b = int(model.geom_bodyid[one]), int(model.geom_bodyid[other])
-    related = a == b or model.body_parentid[a] == b or model.body_parentid[b] == a
-    return bool(a and b) and not related and collide(model, one, other)
+    related = a == b or (a and b and (model.body_parentid[a] == b or model.body_parentid[b] == a))
+    return not related and collide(model, one, other)
 
 
 def _turns_about_y(quaternion: np.ndarray) -> bool:
