@@ -1,7 +1,8 @@
-"""Speed and memory on MountainCar, printed and written to `benchmarks/speed.json`.
+"""Speed and memory of training, printed and written to `benchmarks/speed-ENVIRONMENT.json`.
 
-    python -m benchmarks.speed              everything, beside morl-baselines' PGMORL in the same run (10 minutes)
-    python -m benchmarks.speed --no-peer    without it
+    python -m benchmarks.speed              MountainCar, beside morl-baselines' PGMORL in the same run (10 minutes)
+    python -m benchmarks.speed --env mo-halfcheetah-v5      (15 minutes)
+    python -m benchmarks.speed --no-peer    without the peer
 
 Compilation is timed apart from steady state, and every rate is of whole generations: training, evaluation and
 selection. The peer runs in an environment of its own, `.venv-peer`, which is made the first time (gigabytes).
@@ -36,31 +37,33 @@ from jmorl.search.weights import simplex_grid, spread_weights
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-RESULT = HERE / "speed.json"
 PEER_PYTHON = ROOT / ".venv-peer" / "bin" / "python"
-ENVIRONMENT = "mo-mountaincarcontinuous-v0"
 REPEATS = 3
 
 
 def main() -> None:
     """Measure, print and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--env", default="mo-mountaincarcontinuous-v0")
     parser.add_argument("--no-peer", action="store_true", help="without morl-baselines")
-    parser.add_argument("--generations", type=int, default=5, help="of the measured run (default: 5)")
+    parser.add_argument("--generations", type=int, default=5, help="of the measured runs (default: 5)")
     options = parser.parse_args()
     use_all_cpu_cores()
-    console = Console()
-    report: dict[str, Any] = {"machine": machine(), "run": whole_run(options.generations)}
-    report["parts"] = parts()
+    report: dict[str, Any] = {"env": options.env, "machine": machine()}
+    report["runs"] = {preset: whole_run(options.env, preset, options.generations) for preset in ("paper", "default")}
+    report["parts"] = parts(options.env)
     report["selection"] = [selection(candidates) for candidates in (10, 100, 400)]
-    report["scaling"] = scaling()
+    report["scaling"] = scaling(options.env)
     if not options.no_peer:
-        report["peer"] = peer()
+        report["peer"] = peer(options.env)
         rate = report["peer"]["all_generations"]["steps_per_second"]
-        report["times_the_peer"] = round(report["run"]["steps_per_second"] / rate, 1)
+        for measured in report["runs"].values():
+            measured["times_the_peer"] = round(measured["steps_per_second"] / rate, 1)
+    console = Console()
     for table in tables(report):
         console.print(table)
-    RESULT.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    result = HERE / f"speed-{options.env}.json"
+    result.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
 def machine() -> dict[str, Any]:
@@ -75,9 +78,9 @@ def machine() -> dict[str, Any]:
     }
 
 
-def whole_run(generations: int) -> dict[str, Any]:
-    """A PGMORL run at the paper's sizes: the median generation, and where its time goes."""
-    config = resolve("paper", None, {"env": ENVIRONMENT, "method": "pgmorl"})
+def whole_run(env: str, preset: str, generations: int) -> dict[str, Any]:
+    """A PGMORL run at the preset's sizes: the median generation, and where its time goes."""
+    config = resolve(preset, None, {"env": env, "method": "pgmorl"})
     iterations = config.population.warmup_iterations + (generations - 1) * config.population.iterations + 1
     config = config.replace(steps=iterations * config.steps_per_iteration)
     finished = []
@@ -107,9 +110,9 @@ def _evaluated_steps(finished: list[GenerationFinished]) -> float:
     return float(np.median(counts))
 
 
-def parts() -> dict[str, Any]:
+def parts(env: str) -> dict[str, Any]:
     """The environment alone, with random actions, all of a population's environments on one device."""
-    environment = envs.make(ENVIRONMENT)
+    environment = envs.make(env)
     count, steps = 24, 1000
 
     @jax.jit
@@ -144,11 +147,11 @@ def selection(candidates: int) -> dict[str, Any]:
     return {"candidates": candidates, "seconds": round(_median_seconds(select), 4)}
 
 
-def scaling() -> list[dict[str, Any]]:
+def scaling(env: str) -> list[dict[str, Any]]:
     """What an agent, and an environment, costs in an iteration as there are more of them."""
     rows = []
     for agents, environments in ((6, 4), (24, 4), (96, 4), (6, 64)):
-        config = resolve("paper", None, {"env": ENVIRONMENT}).replace(
+        config = resolve("paper", None, {"env": env}).replace(
             population={"agents": agents}, ppo={"environments": environments}, steps=10**9
         )
         seconds = _iteration_seconds(config, iterations=2)
@@ -189,13 +192,24 @@ def _median_seconds(call: Callable[[], Any]) -> float:
     return statistics.median(seconds)
 
 
-def peer() -> dict[str, Any]:
-    """morl-baselines' PGMORL with the same sizes, on the same machine, now: one short warm-up and one generation."""
+def peer(env: str) -> dict[str, Any]:
+    """morl-baselines' PGMORL at the paper preset's sizes, now: a short warm-up and one generation."""
     if not PEER_PYTHON.exists():
         subprocess.run([sys.executable, "-m", "venv", PEER_PYTHON.parents[1]], check=True)
         install = [PEER_PYTHON, "-m", "pip", "install", "--quiet", "-r", HERE / "peer" / "requirements.txt"]
         subprocess.run(install, check=True)
-    command = [PEER_PYTHON, HERE / "peer" / "pgmorl.py", "--env", ENVIRONMENT]
+    config = resolve("paper", None, {"env": env})
+    sizes = {
+        "--env": env,
+        "--agents": config.population.agents,
+        "--environments": config.ppo.environments,
+        "--rollout-steps": config.ppo.rollout_steps,
+        "--iterations": config.population.iterations,
+        "--steps": config.steps_per_iteration * (config.population.iterations + 1),
+        "--discount": config.ppo.discount,
+    }
+    flags = [str(part) for flag in sizes.items() for part in flag]
+    command = [PEER_PYTHON, HERE / "peer" / "pgmorl.py", *flags]
     result: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     return result
 
@@ -209,29 +223,36 @@ def _cpu_name() -> str:
 
 def tables(report: dict[str, Any]) -> list[Table]:
     """The report for people."""
-    whole = report["run"]
+    speed = Table("preset", "", "rate or share", "time", title=f"{report['env']}, {report['machine']['device']}")
+    for preset, whole in report["runs"].items():
+        for row in _run_rows(whole):
+            speed.add_row(preset, *row)
+        speed.add_section()
+    speed.add_row("", "environment alone, 1 device", f"{report['parts']['environment_steps_per_second']:,} steps/s", "")
+    for row in report["selection"]:
+        speed.add_row("", f"selection, {row['candidates']} candidates", "", f"{row['seconds']:.3f} s")
+    if "peer" in report:
+        rate = report["peer"]["all_generations"]["steps_per_second"]
+        speed.add_row("paper", "morl-baselines, whole generation", f"{rate:,.0f} steps/s", "")
+    cost = Table("agents", "environments", "ms per agent", "µs per step", title="One training iteration")
+    for row in report["scaling"]:
+        fields = ("agents", "environments", "milliseconds_per_agent", "microseconds_per_step")
+        cost.add_row(*(str(row[field]) for field in fields))
+    return [speed, cost]
+
+
+def _run_rows(whole: dict[str, Any]) -> list[tuple[str, str, str]]:
     rows = [
         ("whole generation", f"{whole['steps_per_second']:,} steps/s", f"{whole['total_seconds']:.2f} s"),
         ("- training", f"{whole['train_share']:.1%}", f"{whole['train_seconds']:.2f} s"),
         ("- evaluation", f"{whole['evaluate_share']:.1%}", f"{whole['evaluate_seconds']:.3f} s"),
         ("- selection", f"{whole['select_share']:.1%}", f"{whole['select_seconds']:.3f} s"),
         ("compilation, once a run", "", f"{whole['compile_seconds']:.1f} s"),
-        ("peak memory", f"{whole['peak_memory_mib']:,} MiB", ""),
-        ("environment alone, 1 device", f"{report['parts']['environment_steps_per_second']:,} steps/s", ""),
-        *((f"selection, {row['candidates']} candidates", "", f"{row['seconds']:.3f} s") for row in report["selection"]),
+        ("peak memory so far", f"{whole['peak_memory_mib']:,} MiB", ""),
     ]
-    if "peer" in report:
-        generations = report["peer"]["all_generations"]
-        rows.append(("morl-baselines, whole generation", f"{generations['steps_per_second']:,.0f} steps/s", ""))
-        rows.append(("times as fast", f"{report['times_the_peer']:.1f}", ""))
-    speed = Table("", "rate or share", "time", title=f"{ENVIRONMENT}, paper sizes, {report['machine']['device']}")
-    for row in rows:
-        speed.add_row(*row)
-    cost = Table("agents", "environments", "ms per agent", "µs per step", title="One training iteration")
-    for row in report["scaling"]:
-        fields = ("agents", "environments", "milliseconds_per_agent", "microseconds_per_step")
-        cost.add_row(*(str(row[field]) for field in fields))
-    return [speed, cost]
+    if "times_the_peer" in whole:
+        rows.append(("times as fast as morl-baselines", f"{whole['times_the_peer']:.1f}", ""))
+    return rows
 
 
 if __name__ == "__main__":

@@ -34,7 +34,6 @@ import torch
 from morl_baselines.multi_policy.pgmorl.pgmorl import PGMORL
 from morl_baselines.single_policy.ser.mo_ppo import make_env
 
-GAMMA = 0.995
 # Below every return in the units of the normalised and clipped rewards; a return below it leaves the buffer empty.
 REFERENCE_POINT = np.array([-110.0, -110.0])
 
@@ -58,6 +57,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--warmup-iterations", type=int, default=1, help="K; 10 in the paper")
     parser.add_argument("--iterations", type=int, default=10, help="L")
     parser.add_argument("--steps", type=int, default=264_000, help="budget of training steps")
+    parser.add_argument("--discount", type=float, default=0.995, help="gamma")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1, help="of PyTorch; 2 were slower on two busy cores")
     sizes = parser.parse_args()
@@ -79,7 +79,7 @@ def pgmorl(sizes: argparse.Namespace) -> PGMORL:
         performance_buffer_size=4,
         # As many weights as agents for the warm-up, and half this step between the candidates.
         delta_weight=1 / (sizes.agents - 1),
-        gamma=GAMMA,
+        gamma=sizes.discount,
         seed=sizes.seed,
         log=False,
         device="cpu",
@@ -119,7 +119,7 @@ def run(sizes: argparse.Namespace) -> list[Phase]:
             ("select", "_PGMORL__task_weight_selection"),
         ):
             setattr(algorithm, method, timed(name, getattr(algorithm, method), record))
-        eval_env = make_env(sizes.env, sizes.seed, 0, "evaluation", GAMMA)()
+        eval_env = make_env(sizes.env, sizes.seed, 0, "evaluation", sizes.discount)()
         algorithm.train(total_timesteps=sizes.steps, eval_env=eval_env, ref_point=REFERENCE_POINT)
     return record
 
