@@ -82,6 +82,9 @@ class PPOConfig(Section):
     clip: Positive = Field(0.2, description="range of the policy ratio, and of the value change")
     value_coefficient: NonNegative = Field(0.5, description="weight of the value loss")
     entropy_coefficient: NonNegative = Field(0.0, description="weight of the entropy bonus")
+    action_bound_coefficient: NonNegative = Field(
+        0.0, description="weight of the penalty on mean actions outside the environment's box"
+    )
     max_gradient_norm: Positive = Field(0.5, description="one global norm over all parameters")
     initial_log_std: Finite = Field(0.0, description="log standard deviation of a new agent's actions")
     noise_correlation: Annotated[float, Field(ge=0, lt=1)] = Field(
@@ -129,6 +132,12 @@ class SearchConfig(Section):
     buffer_size: Count = Field(4, description="policies kept in each direction")
 
 
+class CheckpointConfig(Section):
+    """What is kept to resume a run, and to branch off it."""
+
+    keep: Count = Field(20, description="generations whose whole state is kept, the last ones")
+
+
 class Config(Section):
     """One run."""
 
@@ -145,6 +154,7 @@ class Config(Section):
     ppo: PPOConfig = PPOConfig()
     evaluation: EvaluationConfig = EvaluationConfig()
     search: SearchConfig = SearchConfig()
+    checkpoints: CheckpointConfig = CheckpointConfig()
     steps: Count = Field(2_500_000, description="budget of environment steps used for learning")
     reference_point: tuple[Finite, ...] = Field(
         (), description="of the reported hypervolume, raw units; empty: a tenth of the range below the warm-up"
@@ -225,17 +235,32 @@ _TUNED_CAR = {
         "rollout_steps": 1000,
         "discount": 0.999,
         "gae_lambda": 0.98,
-        "learning_rate": 6e-4,
-        "final_learning_rate": 3e-5,
+        "learning_rate": 1e-3,
+        "final_learning_rate": 2e-4,
         "noise_correlation": 0.5,
+        "action_bound_coefficient": 3.0,
     },
     "search": {"delta": 0.2},
 }
 
+_PAPER_CHEETAH = {
+    "population": {"agents": 6, "warmup_iterations": 40, "iterations": 40},
+    "ppo": {"environments": 4, "rollout_steps": 400, "discount": 0.99},
+    "evaluation": {"episodes": 16},
+    "steps": 5_000_000,
+    "reference_point": (-100.0, -6000.0),
+}
+
+# As many steps in a batch, from more environments at once, and half as many updates from it.
+_TUNED_CHEETAH = {
+    **_PAPER_CHEETAH,
+    "ppo": {"environments": 16, "rollout_steps": 100, "minibatches": 16, "discount": 0.99},
+}
+
 # preset -> environment -> what differs from the defaults above
 PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "default": {"mo-mountaincarcontinuous-v0": _TUNED_CAR},
-    "paper": {"mo-mountaincarcontinuous-v0": _PAPER_CAR},
+    "default": {"mo-halfcheetah-v5": _TUNED_CHEETAH, "mo-mountaincarcontinuous-v0": _TUNED_CAR},
+    "paper": {"mo-halfcheetah-v5": _PAPER_CHEETAH, "mo-mountaincarcontinuous-v0": _PAPER_CAR},
 }
 
 

@@ -69,6 +69,13 @@ class Compromise(Probe):
         return -jnp.stack([(action[0] + 0.8) ** 2, (action[0] - 0.8) ** 2])
 
 
+class Clipped(Probe):
+    """The action should be 0.5, but is clipped first: beyond the box all actions are equally bad."""
+
+    def reward(self, state, action):
+        return -jnp.full(2, (jnp.clip(action[0], -1.0, 1.0) - 0.5) ** 2)
+
+
 class Follow(Probe):
     """The action should equal the observation, drawn anew in each episode: does the policy look?"""
 

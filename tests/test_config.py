@@ -40,6 +40,7 @@ OTHER = {
     "ppo.clip": 0.1,
     "ppo.value_coefficient": 1.0,
     "ppo.entropy_coefficient": 0.01,
+    "ppo.action_bound_coefficient": 0.5,
     "ppo.max_gradient_norm": 1.0,
     "ppo.initial_log_std": -0.5,
     "ppo.noise_correlation": 0.2,
@@ -54,6 +55,7 @@ OTHER = {
     "search.weight_divisions": 5,
     "search.buffer_bins": 50,
     "search.buffer_size": 2,
+    "checkpoints.keep": 3,
     "steps": 5_000_000,
     "reference_point": (-500.0, -500.0),
 }
@@ -83,7 +85,7 @@ def test_every_setting_is_used_outside_the_config(name):
     """The authors' `gamma` never reached their agents."""
     attribute = name.rpartition(".")[2]
     sources = [path for path in Path("jmorl").rglob("*.py") if path.name != "config.py"]
-    used = re.compile(rf"(config|search|ppo|population|evaluation)\.{attribute}\b")
+    used = re.compile(rf"(config|search|ppo|population|evaluation|checkpoints)\.{attribute}\b")
     budget = {"steps": "iteration_budget", "ppo.final_learning_rate": r"config\.learning_rate\("}
     used = re.compile(budget[name]) if name in budget else used
     assert any(used.search(path.read_text()) for path in sources)

@@ -34,3 +34,12 @@ def clipped_value_loss(
     clipped_values = old_values + jnp.clip(values - old_values, -clip, clip)
     squared_error = jnp.maximum((values - returns) ** 2, (clipped_values - returns) ** 2)
     return 0.5 * squared_error.mean()
+
+
+def action_bound_loss(mean: jax.Array, low: float, high: float) -> jax.Array:  # [B, A] -> []
+    """The squared distance of the mean actions from the box [low, high], summed over A, mean over the batch.
+
+    Beyond the box all samples do the same, so nothing else pulls a mean back that was driven there while the
+    noise was large. (The "bounds loss" of rl_games, Makoviichuk and Makoviychuk 2021.)
+    """
+    return ((mean - jnp.clip(mean, low, high)) ** 2).sum(-1).mean()

@@ -16,7 +16,7 @@ from flax import struct
 
 from envs.core import Environment, EpisodeState
 from jmorl.config import PPOConfig
-from jmorl.learning.losses import clipped_surrogate_loss, clipped_value_loss, normalize_advantages
+from jmorl.learning.losses import action_bound_loss, clipped_surrogate_loss, clipped_value_loss, normalize_advantages
 from jmorl.learning.networks import Actor, critic_network, gaussian_entropy, gaussian_log_probability
 from jmorl.learning.returns import discounted_sums, generalized_advantages
 from jmorl.learning.rollout import EpisodeReturns, Trajectory, episode_returns, rollout
@@ -268,7 +268,13 @@ class MOPPO:
         )
         value_loss = clipped_value_loss(values, batch.value, batch.returns, self.config.clip)
         entropy = gaussian_entropy(log_std)
-        loss = policy_loss + self.config.value_coefficient * value_loss - self.config.entropy_coefficient * entropy
+        bound_loss = action_bound_loss(mean, self.environment.action_low, self.environment.action_high)
+        loss = (
+            policy_loss
+            + self.config.value_coefficient * value_loss
+            + self.config.action_bound_coefficient * bound_loss
+            - self.config.entropy_coefficient * entropy
+        )
         kl = (batch.log_probability - log_probability).mean()
         return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0))
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from jmorl.config import PPOConfig
-from jmorl.learning.losses import normalize_advantages
+from jmorl.learning.losses import action_bound_loss, normalize_advantages
 from jmorl.learning.moppo import MOPPO, Schedule, _random_order
 from jmorl.learning.returns import discounted_sums
 from jmorl.learning.rollout import correlated_noise
 from jmorl.learning.statistics import normalize, return_scale
-from tests.probes import Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
+from tests.probes import Clipped, Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
 
 QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rate": 3e-3, "discount": 0.9}
 
@@ -140,6 +140,22 @@ def test_the_policy_depends_on_the_observation():
     observations = jnp.linspace(-0.9, 0.9, 7)[:, None]
     mean, _ = jax.vmap(moppo.policy(learner))(observations)
     np.testing.assert_allclose(mean, observations, atol=0.2)
+
+
+def test_the_bound_loss_is_the_squared_distance_from_the_box():
+    means = jnp.array([[0.5, -1.0], [3.0, -2.5], [1.0, 4.0]])
+    assert action_bound_loss(means, -1.0, 2.0) == pytest.approx((0 + (1 + 1.5**2) + 2**2) / 3)
+
+
+@pytest.mark.parametrize(("coefficient", "returns"), [(0.0, False), (1.0, True)])
+def test_only_the_bound_loss_brings_back_a_mean_far_outside_the_box(coefficient, returns):
+    moppo = MOPPO(Clipped(), PPOConfig(**QUICK, initial_log_std=-1.0, action_bound_coefficient=coefficient))
+    learner = moppo.initial_learner(jax.random.key(0))
+    learner.parameters["actor"]["params"]["MLP_0"]["Dense_2"]["bias"] += 3.0
+    schedule = Schedule(40, moppo.config.learning_rate)
+    learner, _ = jax.jit(moppo.train)(learner, jnp.array([0.5, 0.5]), jax.random.key(1), schedule)
+    mean, _ = moppo.policy(learner)(jnp.zeros(1))
+    assert (mean[0] == pytest.approx(0.5, abs=0.1)) if returns else (mean[0] > 1.5)
 
 
 def test_evaluation_counts_an_episode_once_to_its_end():
