@@ -1,0 +1,253 @@
+"""Accuracy and speed of the planar dynamics on the half cheetah, printed and written to `benchmarks/physics.json`.
+
+    python -m benchmarks.physics    beside MuJoCo and MJX in the same run (5 minutes)
+
+Accuracy: one time step from each of 120,000 states, against MuJoCo with a solver that has converged. Speed: environment
+steps of five time steps; repetitions of all three take turns, and the best of each counts, as machines are shared.
+"""
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jax.sharding import Mesh, PartitionSpec
+from mujoco import rollout
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.cheetah_states import KINDS, Steps, cheetah_steps
+from benchmarks.speed import machine
+from envs.half_cheetah import FRAME_SKIP, HalfCheetah
+from envs.mujoco_model import load_model
+from envs.physics import BodyState
+from envs.planar import PlanarPhysics, solver
+from envs.planar.step import forward
+from jmorl.learning.devices import use_all_cpu_cores
+
+RESULT = Path(__file__).parent / "physics.json"
+STATES = 20_000  # of each kind
+FIXED_STEPS = (2, 3, 4, 5, 6, 8)
+# Environments -> environment steps in a repetition: about half a second.
+ENVIRONMENTS = {24: 1000, 384: 120, 4096: 12}
+MJX_ENVIRONMENTS, MJX_STEPS = 384, 4
+REPEATS, MJX_REPEATS = 9, 3
+
+Control = np.ndarray  # [steps, environments, U]
+
+
+def main() -> None:
+    """Measure, print and write."""
+    use_all_cpu_cores()
+    jax.config.update("jax_enable_compilation_cache", False)  # compilation is timed
+    report: dict[str, Any] = {"machine": machine()}
+    report["speed"] = [speed(environments, steps) for environments, steps in ENVIRONMENTS.items()]
+    steps = {kind: cheetah_steps(kind, STATES, seed) for seed, kind in enumerate(KINDS)}
+    report["accuracy"] = {kind: {} for kind in KINDS}
+    for dtype in (np.float32, np.float64):
+        after = advanced(steps, dtype)
+        for kind, errors in after.items():
+            report["accuracy"][kind][dtype.__name__] = distribution(errors)
+    report["newton_steps"] = newton_steps(steps)
+    report["fixed_steps"] = [fixed_steps(steps, count) for count in FIXED_STEPS]
+    console = Console()
+    for table in tables(report):
+        console.print(table)
+    RESULT.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+# ---------------------------------------------------------------- accuracy
+
+
+def advanced(steps: dict[str, Steps], dtype: type) -> dict[str, np.ndarray]:
+    """Errors of the velocity one time step later, the greatest of a state's nine: [N] of each kind, m/s and rad/s."""
+    with jax.enable_x64(dtype is np.float64):
+        physics = PlanarPhysics(load_model("half_cheetah"))
+
+        def advance(qpos: jax.Array, qvel: jax.Array, control: jax.Array) -> jax.Array:
+            return physics.advance(BodyState(qpos, qvel), control, 1)[0].qvel
+
+        program = jax.jit(jax.vmap(advance))
+        return {
+            kind: np.abs(np.asarray(program(*_inputs(each, dtype))) - each.next_qvel[:STATES]).max(1)
+            for kind, each in steps.items()
+        }
+
+
+def _inputs(steps: Steps, dtype: type) -> list[np.ndarray]:
+    return [each[:STATES].astype(dtype) for each in (steps.qpos, steps.qvel, steps.control)]
+
+
+def distribution(errors: np.ndarray) -> dict[str, Any]:
+    """Quantiles, and how many are large."""
+    levels = {"median": 0.5, "99 %": 0.99, "99.9 %": 0.999, "max": 1.0}
+    return {
+        "states": len(errors),
+        **{name: float(f"{np.quantile(errors, level):.2g}") for name, level in levels.items()},
+        "above 1e-3": int((errors > 1e-3).sum()),
+        "above 1e-2": int((errors > 1e-2).sum()),
+    }
+
+
+def newton_steps(steps: dict[str, Steps]) -> dict[str, list[int]]:
+    """How many states take 1, 2, 3, ... steps of Newton's method, the last of which finds that nothing changes."""
+    model = PlanarPhysics(load_model("half_cheetah")).model
+
+    def count(qpos: jax.Array, qvel: jax.Array, control: jax.Array) -> jax.Array:
+        drive = jnp.asarray(model.actuator_gear, control.dtype) @ jnp.clip(control, *model.control_range)
+        state = (each[:, None] for each in (qpos[model.dofs], qvel[model.dofs], drive))
+        return forward(model, *state).solution.steps
+
+    program = jax.jit(jax.vmap(count))
+    counts = {kind: np.bincount(program(*_inputs(each, np.float32))) for kind, each in steps.items()}
+    return {kind: each[1:].tolist() for kind, each in counts.items()}
+
+
+def fixed_steps(steps: dict[str, Steps], count: int) -> dict[str, Any]:
+    """What plain Newton steps miss if there are just so many."""
+    with _at_most(count):
+        errors = np.concatenate(list(advanced(steps, np.float64).values()))
+    return {"steps": count, **distribution(errors)}
+
+
+@contextmanager
+def _at_most(count: int) -> Iterator[None]:
+    whole = solver.MAXIMAL_STEPS
+    solver.MAXIMAL_STEPS = count
+    try:
+        yield
+    finally:
+        solver.MAXIMAL_STEPS = whole
+
+
+# ---------------------------------------------------------------- speed
+
+
+def speed(environments: int, steps: int) -> dict[str, Any]:
+    """Environment steps a second, of so many environments for so many steps, by everyone who takes part."""
+    start = _started(environments)
+    rng = np.random.default_rng(1)
+    controls = rng.uniform(-1, 1, (steps, environments, 6)).astype(np.float32)
+    compiled: dict[str, float] = {}
+    players = {
+        "planar": _jax_player("planar", start, controls, compiled),
+        "mujoco": _mujoco_player(start, controls),
+    }
+    row: dict[str, Any] = {"environments": environments, **_best(players, REPEATS, environments * steps)}
+    if environments == MJX_ENVIRONMENTS:
+        few = controls[:MJX_STEPS]
+        players = {
+            "planar": _jax_player("planar", start, few, {}),
+            "mjx": _jax_player("mjx", start, few, compiled),
+        }
+        row["beside mjx"] = _best(players, MJX_REPEATS, environments * MJX_STEPS)
+    return row | {"compile_seconds": {name: round(seconds, 1) for name, seconds in compiled.items()}}
+
+
+def _started(environments: int) -> tuple[np.ndarray, np.ndarray]:
+    """States a second after their start under random actions, most of them on the ground: qpos and qvel [N, 9]."""
+    steps = cheetah_steps("random actions", 200 * 100, seed=0)
+    chosen = np.random.default_rng(0).choice(len(steps.qpos), environments)
+    return steps.next_qpos[chosen], steps.next_qvel[chosen]
+
+
+def _jax_player(
+    physics: str, start: tuple[np.ndarray, np.ndarray], controls: Control, compiled: dict[str, float]
+) -> Callable[[], None]:
+    """The physics of `HalfCheetah`, its batch over all devices, as one program. Notes its compilation's seconds."""
+    dynamics = HalfCheetah(physics).physics
+
+    def advance(state: BodyState, control: jax.Array) -> tuple[BodyState, None]:
+        return jax.vmap(lambda one, force: dynamics.advance(one, force, FRAME_SKIP)[0])(state, control), None
+
+    def play(state: BodyState, controls: jax.Array) -> BodyState:
+        return jax.lax.scan(advance, state, controls)[0]
+
+    mesh = Mesh(jax.devices(), ("device",))
+    first, second = PartitionSpec("device"), PartitionSpec(None, "device")
+    sharded = jax.shard_map(play, mesh=mesh, in_specs=(first, second), out_specs=first, check_vma=False)
+    qpos, qvel = (jnp.asarray(each, jnp.float32) for each in start)
+    arguments = BodyState(qpos, qvel), controls
+    began = time.perf_counter()
+    program = jax.jit(sharded).lower(*arguments).compile()
+    compiled[physics] = time.perf_counter() - began
+    return lambda: jax.block_until_ready(program(*arguments)) and None
+
+
+def _mujoco_player(start: tuple[np.ndarray, np.ndarray], controls: Control) -> Callable[[], None]:
+    """MuJoCo's own rollouts on all threads, an environment step at a time, as a policy needs it."""
+    model = load_model("half_cheetah")
+    threads = len(os.sched_getaffinity(0))
+    pool, workers = rollout.Rollout(nthread=threads), [mujoco.MjData(model) for _ in range(threads)]
+    times = np.zeros((len(start[0]), 1))
+    held = np.repeat(controls[:, :, None], FRAME_SKIP, axis=2).astype(np.float64)  # [steps, N, substeps, U]
+
+    def play() -> None:
+        state = np.concatenate([times, *start], axis=1)
+        for control in held:
+            state = pool.rollout(model, workers, state, control)[0][:, -1]
+
+    return play
+
+
+def _best(players: dict[str, Callable[[], None]], repeats: int, steps: int) -> dict[str, Any]:
+    """Each player's best rates in turns, by the clock and by the processors' time; and the first against the second."""
+    clock, processor = (dict.fromkeys(players, np.inf) for _ in range(2))
+    for player in players.values():
+        player()
+    for _ in range(repeats):
+        for name, player in players.items():
+            began = time.perf_counter(), time.process_time()
+            player()
+            clock[name] = min(clock[name], time.perf_counter() - began[0])
+            processor[name] = min(processor[name], time.process_time() - began[1])
+    ours, theirs = players
+    return {
+        "steps_per_second": {name: round(steps / seconds) for name, seconds in clock.items()},
+        "steps_per_processor_second": {name: round(steps / seconds) for name, seconds in processor.items()},
+        "times_as_fast": round(clock[theirs] / clock[ours], 2),
+        "times_as_fast_by_processor": round(processor[theirs] / processor[ours], 2),
+    }
+
+
+# ---------------------------------------------------------------- for people
+
+
+def tables(report: dict[str, Any]) -> Iterator[Table]:
+    """The report for people."""
+    rates = Table("environments", "planar", "other", "times as fast", "by processor time")
+    for row in report["speed"]:
+        for result in filter(None, (row, row.get("beside mjx"))):
+            (_, ours), (other, theirs) = result["steps_per_second"].items()
+            ratios = result["times_as_fast"], result["times_as_fast_by_processor"]
+            rates.add_row(str(row["environments"]), f"{ours:,}", f"{other} {theirs:,}", *map(str, ratios))
+    seconds = {name: time for row in report["speed"] for name, time in row["compile_seconds"].items()}
+    compilation = ", ".join(f"{name} {time} s" for name, time in seconds.items())
+    rates.title = f"Environment steps per second, {report['machine']['device']}; compilation: {compilation}"
+    yield rates
+    errors = ("median", "99 %", "99.9 %", "max", "above 1e-3", "above 1e-2")
+    accuracy = Table("states", *errors, title=f"Error of the velocity after a time step, {STATES:,} states a row")
+    for kind, types in report["accuracy"].items():
+        for dtype, row in types.items():
+            accuracy.add_row(f"{kind}, {dtype}", *(f"{row[column]:.2g}" for column in errors))
+    yield accuracy
+    misses = Table("Newton steps", *errors, title="The same with so many plain Newton steps, float64, all states")
+    for row in report["fixed_steps"]:
+        misses.add_row(str(row["steps"]), *(f"{row[column]:.4g}" for column in errors))
+    yield misses
+    longest = max(map(len, report["newton_steps"].values()))
+    counts = Table("states", *map(str, range(1, longest + 1)), title="States by Newton steps taken, float32")
+    for kind, row in report["newton_steps"].items():
+        counts.add_row(kind, *map(str, row))
+    yield counts
+
+
+if __name__ == "__main__":
+    main()
