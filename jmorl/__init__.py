@@ -8,6 +8,7 @@ from jmorl.decision.protocol import Answer, DecisionMaker, Question
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.population import TrainingFault
 from jmorl.run import run
+from jmorl.storage.continuing import branch, resume
 from jmorl.storage.policy_file import load_policy, save_policy
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
@@ -20,9 +21,11 @@ __all__ = [
     "Question",
     "RunFolder",
     "TrainingFault",
+    "branch",
     "load_policy",
     "read_run",
     "resolve",
+    "resume",
     "run",
     "save_policy",
     "use_all_cpu_cores",

@@ -81,6 +81,14 @@ class Compiled:
 
 
 @dataclass(frozen=True)
+class Resumed:
+    """The run goes on from this state, instead of beginning with a warm-up."""
+
+    state: RunState
+    steps: int  # environment steps used for learning before
+
+
+@dataclass(frozen=True)
 class Decided:
     """The decision maker has answered."""
 
@@ -126,20 +134,24 @@ class RunFinished:
     reason: Literal["budget", "satisfied", "stopped"]
 
 
-Event = Compiled | Decided | GenerationFinished | RunFinished
+Event = Compiled | Resumed | Decided | GenerationFinished | RunFinished
 
 
 def run(
-    config: Config, decision_maker: DecisionMaker | None = None, environment: Environment[Any] | None = None
+    config: Config,
+    decision_maker: DecisionMaker | None = None,
+    environment: Environment[Any] | None = None,
+    state: RunState | None = None,
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
-    `decision_maker` and `environment` default to those the config names. Raises TrainingFault in the generation
-    in which a number stops being finite; the events before it stand.
+    `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
+    earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
+    Raises TrainingFault in the generation in which a number stops being finite; the events before it stand.
     """
     environment = environment or envs.make(config.env)
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
-    return _Run(config, environment, decision_maker).events()
+    return _Run(config, environment, decision_maker).events(state)
 
 
 def evaluation_keys(config: Config) -> jax.Array:
@@ -164,11 +176,14 @@ class _Run:
         self.initial_key, self.training_key, _ = _keys(config)
         self.start_keys = evaluation_keys(config)
 
-    def events(self) -> Iterator[Event]:
+    def events(self, state: RunState | None) -> Iterator[Event]:
         yield Compiled(self.population.compile(self.start_keys), len(self.population.devices))
-        finished = self.warm_up()
-        yield finished
-        state = finished.state
+        if state is None:
+            finished = self.warm_up()
+            yield finished
+            state = finished.state
+        else:
+            yield Resumed(state, self._steps(state))
         while self._budget_left(state) and not self._satisfied(state):
             if self.config.method == "interactive" and not state.silent_generations:
                 decided = self.ask(state, "steer", state.archive.members)
@@ -228,6 +243,10 @@ class _Run:
         chosen = question.policy(answer.policy)
         bounds = self._bounds(state, chosen) if purpose == "steer" else state.bounds
         return Decided(question, answer, chosen, bounds, seconds)
+
+    def _steps(self, state: RunState) -> int:
+        """Environment steps used for learning so far."""
+        return state.iterations * self.config.steps_per_iteration
 
     def _budget_left(self, state: RunState) -> bool:
         return state.iterations < self.config.iteration_budget
@@ -315,7 +334,7 @@ class _Run:
             state,
             offspring,
             lineage.candidates if lineage else 0,
-            state.iterations * self.config.steps_per_iteration,
+            self._steps(state),
             seconds,
             iterations * self.config.steps_per_iteration / seconds.total,
             diagnostics.means(),
@@ -354,7 +373,8 @@ def _policies(
             values=scores.values[index],
             spread=scores.spread[index],
             discounted=scores.discounted[index],
-            snapshot=jax.tree.map(lambda leaf, index=index: leaf[index], learners),
+            # Copied, or each policy would keep those of its whole generation in memory.
+            snapshot=jax.tree.map(lambda leaf, index=index: leaf[index].copy(), learners),
             predicted=lineage.predicted[index] if lineage else None,
         )
         for index in range(len(weights))

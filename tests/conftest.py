@@ -4,14 +4,13 @@ import hypothesis
 import jax
 import pytest
 
-import envs
 from jmorl.config import Config
 from jmorl.learning.devices import use_all_cpu_cores
-from tests.probes import ThreeWays
+from tests.registered import ThreeWays
+from tests.resuming import share_compiled_programs, train
 
 use_all_cpu_cores()
 jax.config.update("jax_num_cpu_devices", 2)
-envs.register(ThreeWays.id, ThreeWays)
 
 # Examples are the same in every run, and a slow machine is no failure.
 hypothesis.settings.register_profile("jmorl", deadline=None, derandomize=True)
@@ -30,3 +29,17 @@ def small_config():
         search={"weight_divisions": 4},
         steps=4 * 3 * 16 * 11,
     )
+
+
+@pytest.fixture(scope="module")
+def compiled_once():
+    """Runs share their compiled programs while this is in use."""
+    with pytest.MonkeyPatch.context() as patch:
+        share_compiled_programs(patch)
+        yield
+
+
+@pytest.fixture(scope="module")
+def whole(compiled_once, small_config, tmp_path_factory):
+    """The folder of a run that nobody interrupted: warm-up, three generations, four questions."""
+    return train(tmp_path_factory.mktemp("runs") / "whole", small_config)

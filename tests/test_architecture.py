@@ -14,6 +14,8 @@ MAY_IMPORT = {
     "jmorl.display": {"envs", "jmorl.search"},
     "jmorl.decision": {"envs", "jmorl.display", "jmorl.search"},
     "jmorl.config": {"envs", "jmorl.decision"},
+    "jmorl.signals": set(),
+    "jmorl.arguments": {"jmorl.config"},
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},

@@ -192,3 +192,29 @@ def test_a_script_that_does_not_fit_stops_the_run_and_keeps_what_it_had(trained,
     assert "no decision for generation 2" in capsys.readouterr().err
     assert len(rows(tmp_path / "run" / "metrics.csv")) == 2
     assert main(["show", str(tmp_path / "run")]) == 0
+
+
+def test_export_copies_a_policy(trained, tmp_path, capsys):
+    policy = int(rows(trained / "front.csv")[0]["policy"])
+    target = tmp_path / "policy.npz"
+    assert main(["export", str(trained), "--policy", str(policy), "--to", str(target)]) == 0
+    assert capsys.readouterr().out == f"{target}: policy {policy}\n"
+    assert load_policy(target).header["id"] == policy
+    assert main(["export", str(trained), "--to", str(target)]) == 2
+    assert "exists; choose another file, or overwrite it with --force" in capsys.readouterr().err
+    assert main(["export", str(trained), "--to", str(target), "--force"]) == 0
+    assert load_policy(target).header["id"] == read_run(trained).chosen.id
+
+
+def test_branch_makes_a_run_with_another_user(trained, tmp_path, capsys):
+    folder = tmp_path / "branch"
+    arguments = ["branch", str(trained), "--generation", "2", "--user", "weights=0,1,0", "--out", str(folder)]
+    assert main([*arguments, "--quiet"]) == 0
+    assert read_run(folder).config.user == "weights=0,1,0"
+    assert [len((path / "metrics.csv").read_text().splitlines()) for path in (trained, folder)] == [5, 5]
+    assert main([*arguments, "--force", "--json"]) == 0
+    events = [json.loads(line)["event"] for line in capsys.readouterr().out.splitlines()]
+    assert events == ["compiled", "resumed", "decided", "generation", "decided", "finished"]
+    assert main(["branch", str(trained), "--generation", "2", "--user", "Z", "--out", str(tmp_path / "no")]) == 2
+    assert "user: unknown user 'Z'" in capsys.readouterr().err
+    assert not (tmp_path / "no").exists()

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from jmorl.config import Config
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished
+from jmorl.run import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, RunState
 
 Phase = Literal["compiling", "warm-up", "generation", "question", "finished"]
 
@@ -20,7 +20,8 @@ class Timeline:
     silent: int = 0  # generations before the next question, the one that is going on included
     compiled: Compiled | None = None
     decided: Decided | None = None  # the last answer
-    finished: GenerationFinished | None = None  # the last generation
+    resumed: Resumed | None = None  # where the run was taken up
+    finished: GenerationFinished | None = None  # the last generation since
     result: RunFinished | None = None
 
     @property
@@ -45,8 +46,10 @@ class Timeline:
         match event:
             case Compiled():
                 return replace(self, phase="warm-up", since=now, compiled=event)
+            case Resumed():
+                return replace(self._next(event.state), since=now, resumed=event)
             case GenerationFinished():
-                return replace(self._next(event), since=now, finished=event)
+                return replace(self._next(event.state), since=now, finished=event)
             case Decided():
                 goes_on = event.question.purpose == "steer" and not event.answer.stop
                 phase: Phase = "generation" if goes_on else "question"
@@ -66,7 +69,7 @@ class Timeline:
     def steps(self, now: float) -> int:
         """Environment steps so far; within a generation as many as it should have made by now."""
         if self.finished is None:
-            return 0
+            return self.resumed.steps if self.resumed else 0
         expected = self.generation_seconds()
         share = min((now - self.since) / expected, 1.0) if self.phase == "generation" and expected else 0.0
         return self.finished.steps + int(share * self.generation_steps)
@@ -90,9 +93,9 @@ class Timeline:
         running = max(each - (now - self.since), 0.0) if self.phase == "generation" else 0.0
         return running + generations * each
 
-    def _next(self, event: GenerationFinished) -> "Timeline":
-        """What follows on a generation."""
-        generation, silent = event.state.generation + 1, event.state.silent_generations
+    def _next(self, state: RunState) -> "Timeline":
+        """What follows on a generation that ended with this state."""
+        generation, silent = state.generation + 1, state.silent_generations
         asks = self.config.method == "interactive" and not silent
         phase: Phase = "question" if asks or generation > self.generations else "generation"
         return replace(self, phase=phase, generation=generation, silent=silent)

@@ -15,7 +15,7 @@ from jmorl.config import Config
 from jmorl.display.fronts import front_table
 from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
 from jmorl.report.timeline import Timeline
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished
+from jmorl.run import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.search.policy import Policy
 
 
@@ -59,6 +59,9 @@ class Lines(Watcher):
         match event:
             case Compiled():
                 return f"compiled in {duration(event.seconds)} on {plural(event.devices, 'device')}"
+            case Resumed():
+                front = len(event.state.archive.members)
+                return f"resumed after {self._name(event.state.generation)}, with a front of {front}"
             case GenerationFinished():
                 return self._generation_line(event)
             case Decided():
@@ -68,7 +71,6 @@ class Lines(Watcher):
 
     def _generation_line(self, event: GenerationFinished) -> str:
         generation, seconds = event.state.generation, event.seconds
-        name = f"generation {generation} of {self.generations}" if generation else "warm-up"
         facts = [
             f"{short_count(event.steps)} steps",
             f"{short_count(event.steps_per_second)} steps/s",
@@ -82,7 +84,10 @@ class Lines(Watcher):
         times = f"train {duration(seconds.train)}, evaluate {duration(seconds.evaluate)}"
         if generation:
             times = f"select {duration(seconds.select)}, {times}"
-        return f"{name}: {', '.join(facts)} ({times})"
+        return f"{self._name(generation)}: {', '.join(facts)} ({times})"
+
+    def _name(self, generation: int) -> str:
+        return f"generation {generation} of {self.generations}" if generation else "warm-up"
 
 
 class Json(Watcher):
@@ -91,6 +96,7 @@ class Json(Watcher):
     `event` says which one, and `values`, `spread`, `weights` and `bounds` have a number for each objective:
 
         {"event": "compiled", "seconds", "devices"}
+        {"event": "resumed", "generation": the last one finished, "steps"}
         {"event": "generation", "generation": 0 is the warm-up, "generations": in the budget, "steps",
          "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",
          "policy_loss", "value_loss", "entropy", "approximate_kl", "bounds",
@@ -115,6 +121,8 @@ class Json(Watcher):
         match event:
             case Compiled():
                 return {"event": "compiled", **asdict(event)}
+            case Resumed():
+                return {"event": "resumed", "generation": event.state.generation, "steps": event.steps}
             case GenerationFinished():
                 return self._generation_fields(event)
             case Decided():

@@ -1,10 +1,13 @@
 """A policy as one file: a NumPy archive with a JSON header, read without pickle and without JAX.
 
-The header names the environment, objectives, scores and origin; the arrays are the actor's layers and the
-observation statistics. `load_policy(path)(observation)` is the deterministic action.
+The header names the environment, objectives with their units, scores and their spread, weights and origin, and says
+how the network is computed; the arrays are the actor's layers and the observation statistics.
+`load_policy(path)(observation)` is the deterministic action.
 """
 
+import importlib.metadata
 import json
+import shutil
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +20,14 @@ from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
 from jmorl.search.policy import Policy
 from jmorl.storage.files import written_whole
+from jmorl.storage.versions import NewerFormat, check_format
 
 FORMAT = 1
+INPUT = {"variance_floor": VARIANCE_FLOOR, "clip": NORMALIZED_CLIP}
 
 
 class PolicyFileError(ValueError):
-    """A file that is no policy, or one of a newer format."""
+    """A file that is no policy."""
 
 
 @dataclass(frozen=True)
@@ -42,20 +47,27 @@ class StoredPolicy:
 
     def mean_action(self, observation: Any, xp: Any = np) -> Any:
         """The unclipped mean action; `xp` may be `jax.numpy` to trace it."""
-        x = (observation - self.observation_mean) / np.sqrt(self.observation_variance + VARIANCE_FLOOR)
-        x = xp.clip(x, -NORMALIZED_CLIP, NORMALIZED_CLIP)
+        floor, limit = self.header["network"]["variance_floor"], self.header["network"]["clip"]
+        x = (observation - self.observation_mean) / np.sqrt(self.observation_variance + floor)
+        x = xp.clip(x, -limit, limit)
         for kernel, bias in self.layers[:-1]:
             x = xp.tanh(x @ kernel + bias)
         kernel, bias = self.layers[-1]
         return x @ kernel + bias
 
 
-def save_policy(path: Path, policy: Policy, environment: Environment[Any], config: Config) -> None:
-    """Write a policy whose snapshot is a `Learner`, with the run it comes from noted in the header."""
+def save_policy(
+    path: Path, policy: Policy, environment: Environment[Any], config: Config, run: str | None = None
+) -> None:
+    """Write a policy whose snapshot is a `Learner`, with where it comes from noted in the header.
+
+    `run` is the id in the run's manifest, if it has one.
+    """
     parameters = policy.snapshot.parameters["actor"]["params"]
     layers = [parameters["MLP_0"][f"Dense_{index}"] for index in range(len(parameters["MLP_0"]))]
     header = {
         "format": FORMAT,
+        "jmorl": importlib.metadata.version("jmorl"),
         "environment": config.env,
         "objectives": [vars(objective) for objective in environment.objectives],
         "action_limits": [environment.action_low, environment.action_high],
@@ -68,7 +80,12 @@ def save_policy(path: Path, policy: Policy, environment: Environment[Any], confi
         "discounted": policy.discounted.tolist(),
         "evaluation_episodes": config.evaluation.episodes,
         "discount": config.ppo.discount,
-        "run": {"config": config.digest(), "method": config.method, "seed": config.seed},
+        "run": {"id": run, "config": config.digest(), "method": config.method, "seed": config.seed},
+        "network": {
+            "sizes": [environment.observation_size, *config.ppo.hidden_sizes, environment.action_size],
+            "activation": "tanh",
+            **INPUT,
+        },
     }
     statistics = policy.snapshot.observation_statistics
     arrays = {
@@ -100,19 +117,38 @@ def policy_path(place: Path, policy_id: int | None = None) -> Path:
 
 
 def load_policy(path: Path | str) -> StoredPolicy:
-    """Read a policy. Raises PolicyFileError, naming the file, if it is not one that can be read."""
+    """Read a policy. Raises PolicyFileError, naming the file, if it is not one that can be read, and NewerFormat."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         header = json.loads(str(arrays["header"]))
-        if header["format"] > FORMAT:
-            raise PolicyFileError(f"{path} has format {header['format']}, newer than {FORMAT}; use a newer jmorl")
+        check_format(header, FORMAT, header.get("jmorl"), str(path))
+        header.setdefault("network", INPUT)  # files of the first versions do not say
         count = sum(name.endswith("_kernel") for name in arrays)
         layers = tuple((arrays[f"layer_{i}_kernel"], arrays[f"layer_{i}_bias"]) for i in range(count))
         return StoredPolicy(
             header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"]
         )
-    except PolicyFileError:
+    except NewerFormat:
         raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
         raise PolicyFileError(f"{path} is not a policy file: {error}") from error
+
+
+def export_policy(place: Path, policy_id: int | None, target: Path, force: bool = False) -> StoredPolicy:
+    """Copy a policy, found as by `policy_path` and readable, to a file that did not exist unless `force` is given.
+
+    Raises PolicyFileError.
+    """
+    source = policy_path(place, policy_id)
+    policy = load_policy(source)
+    if target.is_dir():
+        raise PolicyFileError(f"{target} is a folder; name a file")
+    if target.exists() and not force:
+        raise PolicyFileError(f"{target} exists; choose another file, or overwrite it with --force")
+    try:
+        with written_whole(target) as temporary:
+            shutil.copyfile(source, temporary)
+    except OSError as error:
+        raise PolicyFileError(f"{target} cannot be written: {error.strerror}") from error
+    return policy

@@ -14,6 +14,8 @@ from envs.core import Objective
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.records import Record, ScriptError, read_log
 from jmorl.search.policy import Policy
+from jmorl.storage.manifest import read_manifest
+from jmorl.storage.versions import NewerFormat
 
 
 class StoredRunError(ValueError):
@@ -47,11 +49,11 @@ class StoredRun:
 
 
 def read_run(path: Path) -> StoredRun:
-    """Read a run folder. Raises StoredRunError, naming the file, if there is none or it cannot be read."""
+    """Read a run folder. Raises StoredRunError, naming the file, if there is none or it cannot be read; and
+    NewerFormat.
+    """
     try:
-        manifest = json.loads((path / "manifest.json").read_text(encoding="utf-8"))
-        if manifest["format"] > 1:
-            raise StoredRunError(f"{path} was written by a newer jmorl (format {manifest['format']}); use that")
+        manifest = read_manifest(path)
         config = resolve(file=path / "config.toml")
         objectives = envs.make(config.env).objectives
         policies = tuple(_policy(row, objectives) for row in _rows(path / "policies.csv"))
@@ -68,6 +70,8 @@ def read_run(path: Path) -> StoredRun:
             tuple(read_log(log)) if log.exists() else (),
             json.loads(result.read_text(encoding="utf-8")) if result.exists() else None,
         )
+    except NewerFormat:
+        raise
     except FileNotFoundError as error:
         raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up: {error}") from error
     except (OSError, KeyError, IndexError, ValueError, ConfigError, ScriptError) as error:

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from jmorl.config import resolve
 from jmorl.report.timeline import Timeline
+from jmorl.run import Resumed
 
 
 def config_of(**changes):
@@ -51,6 +52,13 @@ def test_the_phases_of_an_interactive_run(make_events):
         ("question", 3),
         ("finished", 3),
     ]
+
+
+def test_a_resumed_run_goes_on_where_it_was(make_events):
+    compiled, *_, finished, decided = make_events(generations=3)[:5]
+    after = timelines([compiled, Resumed(finished.state, finished.steps), decided], config_of())
+    assert [(each.phase, each.generation) for each in after] == [("warm-up", 0), ("question", 2), ("generation", 2)]
+    assert [each.steps(100.0) for each in after] == [0, finished.steps, finished.steps]
 
 
 def test_without_questions_generations_follow_each_other(make_events):

@@ -13,7 +13,7 @@ from jmorl.config import resolve
 from jmorl.report.live import LiveView
 from jmorl.report.progress import watcher
 from jmorl.report.watchers import Lines
-from jmorl.run import GenerationFinished
+from jmorl.run import GenerationFinished, Resumed
 from tests.report.conftest import OBJECTIVES
 
 
@@ -42,6 +42,16 @@ def test_there_is_a_line_for_every_event_and_the_result_as_a_table(make_events):
     assert lines[len(starts) : len(starts) + 2] == ["", "Final front" + " " * (len(lines[len(starts) + 1]) - 11)]
     [chosen] = [line for line in lines if line.rstrip().endswith("chosen")]
     assert chosen.split()[:5] == ["58", "-91.7", "±0.9", "-38.9", "±0.4"]
+
+
+def test_a_resumed_run_says_where_it_goes_on(make_events, capsys):
+    events = make_events()
+    warm_up, later = (Resumed(finished.state, finished.steps) for finished in (events[1], events[5]))
+    assert shown("lines", [warm_up]) == "resumed after warm-up, with a front of 4\n"
+    assert shown("lines", [later]).startswith("resumed after generation 2 of 10, with a front of ")
+    assert "choice for generation 3" in shown("live", [events[0], later])
+    shown("json", [later])
+    assert json.loads(capsys.readouterr().out) == {"event": "resumed", "generation": 2, "steps": later.steps}
 
 
 def test_a_choice_is_said_with_values_and_bounds(make_events):

@@ -1,0 +1,133 @@
+"""What the command line takes: commands, their arguments, and a flag for every setting."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from jmorl.config import PRESETS, Config, Section
+
+SETTING = "setting."  # marks the parsed options that are fields of the config
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command line takes. `command` of the parsed options is the name of the one given."""
+    whole = argparse.ArgumentParser(
+        prog="jmorl",
+        description="Interactive multi-objective reinforcement learning: train a population, choose, converge.",
+        epilog="Exit codes: 0 done, 1 the run failed (what it had is kept), 2 bad input (nothing was made), "
+        "130 and 143 ended by SIGINT (Ctrl-C) and SIGTERM (what it had is kept).",
+    )
+    commands = whole.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    _add_train(commands)
+    _add_continuing(commands)
+
+    enautilus = commands.add_parser(
+        "enautilus", help="choose a policy from the front of a finished run, step by step (E-NAUTILUS)"
+    )
+    enautilus.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    enautilus.add_argument("--user", help="who decides, as in train (default: the run's own user)")
+    enautilus.add_argument("--iterations", type=_count, default=3, help="choices until the front (default: 3)")
+    enautilus.add_argument("--points", type=_count, default=3, help="points shown each time (default: 3)")
+    enautilus.add_argument("--json", action="store_true", help="print the chosen policy as JSON")
+
+    evaluate = commands.add_parser("evaluate", help="score a saved policy on fresh episodes")
+    _add_policy(evaluate)
+    evaluate.add_argument("--in", dest="where", choices=["gymnasium"], help="also in MO-Gymnasium, side by side")
+    evaluate.add_argument("--episodes", type=_count, default=100, help="default: 100")
+    evaluate.add_argument("--seed", type=int, default=0, help="of the start states (default: 0)")
+    evaluate.add_argument("--json", action="store_true", help="print every episode's returns as JSON")
+
+    play = commands.add_parser("play", help="draw an episode of a saved policy: animation, film, or strip of poses")
+    _add_policy(play)
+    play.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .png (a strip)")
+    play.add_argument("--seed", type=int, default=0, help="of the start state, as in evaluate (default: 0)")
+    play.add_argument("--steps", type=_count, help="at most so many (default: the whole episode)")
+    play.add_argument("--size", type=_size, metavar="PIXELS", help="width (default: 640, for a strip 1280)")
+    play.add_argument("--force", action="store_true", help="overwrite the file")
+
+    show = commands.add_parser("show", help="print a run's tables and draw its plots")
+    show.add_argument("run", type=Path, metavar="RUN", help="run folder")
+
+    commands.add_parser("envs", help="list the environments")
+    return whole
+
+
+def _add_train(commands: Any) -> None:
+    train = commands.add_parser(
+        "train",
+        help="train a population, with a decision maker in the loop",
+        description="Preset, then config file, then flags: each overrides the one before.",
+        formatter_class=argparse.RawTextHelpFormatter,
+    )
+    train.add_argument("--preset", default="default", help=f"{', '.join(PRESETS)} (default: default)")
+    train.add_argument("--config", type=Path, metavar="FILE", help="settings as TOML, for instance a run's config.toml")
+    train.add_argument("--out", type=Path, metavar="FOLDER", help="run folder (default: runs/DATE-TIME)")
+    train.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
+    _add_output(train)
+    _add_settings(train, train.add_argument_group("settings"), Config, "")
+
+
+def _add_continuing(commands: Any) -> None:
+    resume = commands.add_parser(
+        "resume", help="go on with a run that was interrupted, to the result it would have had"
+    )
+    resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    _add_output(resume)
+
+    branch = commands.add_parser("branch", help="begin a new run where a run was after one of its generations")
+    branch.add_argument("run", type=Path, metavar="RUN", help="run folder, which stays as it is")
+    branch.add_argument(
+        "--generation", type=int, required=True, metavar="K", help="the last one taken over; 0: warm-up"
+    )
+    branch.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder of the new run")
+    branch.add_argument("--user", help="who decides from then on, as in train (default: the run's own user)")
+    branch.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
+    _add_output(branch)
+
+    export = commands.add_parser("export", help="copy a policy of a run to a file of its own")
+    export.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    export.add_argument("--policy", type=int, metavar="ID", help="default: the run's choice")
+    export.add_argument("--to", type=Path, required=True, metavar="FILE", help="a NumPy archive, .npz")
+    export.add_argument("--force", action="store_true", help="overwrite the file")
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for each event")
+
+
+def _add_policy(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("policy", type=Path, metavar="RUN_OR_POLICY", help="run folder, or policy file")
+    parser.add_argument("--policy", dest="id", type=int, metavar="ID", help="of a run folder (default: its choice)")
+
+
+def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Section], prefix: str) -> None:
+    """One flag for every field. Values stay strings here, so that the config can name all problems at once."""
+    for name, field in section.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, Section):
+            title = f"{name}: {(kind.__doc__ or '').splitlines()[0]}"
+            _add_settings(parser, parser.add_argument_group(title), kind, f"{prefix}{name}.")
+        else:
+            default = field.default if not isinstance(field.default, tuple) else ",".join(map(str, field.default))
+            shown = "" if default is None else f" ({default})"
+            group.add_argument(
+                f"--{prefix}{name}".replace("_", "-"),
+                dest=f"{SETTING}{prefix}{name}",
+                metavar=name.rpartition("_")[2].upper(),
+                help=f"{field.description}{shown}".replace("%", "%%"),
+            )
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, not {number}")
+    return number
+
+
+def _size(text: str) -> int:
+    number = int(text)
+    if not 160 <= number <= 4096:
+        raise argparse.ArgumentTypeError(f"must be from 160 to 4096, not {number}")
+    return number

@@ -1,0 +1,89 @@
+"""SIGINT and SIGTERM: the first asks a run to end in good order, a second ends the process at once."""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal asked the program to end. `exit_code` is what shells give for it: 130 or 143."""
+
+    def __init__(self, number: int):
+        self.number = number
+        super().__init__(f"{signal.Signals(number).name} received")
+
+    @property
+    def exit_code(self) -> int:
+        return 128 + self.number
+
+
+class StopSignals:
+    """Within the block a signal is noted, and raised as Interrupted where it does no harm: in `check` and `asking`.
+
+    A compiled call cannot be broken off, and Python runs its own handlers only after it. So a thread reads the signals
+    as they come: it says what will happen, and at the second ends the process there and then. For the main thread.
+    """
+
+    def __init__(self, says: str = "stopping after this generation; once more to stop at once, without it"):
+        self.says = says
+        self.received: int | None = None
+        self._asking = False
+
+    def __enter__(self) -> Self:
+        self._read_end, self._write_end = os.pipe()
+        os.set_blocking(self._write_end, False)
+        self._wakeup = signal.set_wakeup_fd(self._write_end)
+        # What is ignored, as in a background job of a shell script, is to stay so.
+        heard = [each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN]
+        self._handlers: dict[signal.Signals, Any] = {each: signal.signal(each, self._handle) for each in heard}
+        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        for each, handler in self._handlers.items():
+            signal.signal(each, handler)
+        signal.set_wakeup_fd(self._wakeup)
+        os.close(self._write_end)  # which ends the thread
+        self._thread.join()
+        os.close(self._read_end)
+
+    def check(self) -> None:
+        """Raise Interrupted if a signal has come."""
+        if self.received is not None:
+            raise Interrupted(self.received)
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """While somebody is asked, a signal is raised at once."""
+        self._asking = True
+        try:
+            self.check()
+            yield
+        finally:
+            self._asking = False
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.received = number
+        if self._asking:
+            raise Interrupted(number)
+
+    def _watch(self) -> None:
+        came = 0
+        while numbers := os.read(self._read_end, 1):
+            if numbers[0] not in SIGNALS:
+                continue
+            came += 1
+            if came > 1:
+                os._exit(128 + numbers[0])
+            if not self._asking:
+                print(f"jmorl: {self.says}", file=sys.stderr, flush=True)

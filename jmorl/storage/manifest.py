@@ -1,0 +1,82 @@
+"""manifest.json of a run folder: which run it is, what made it, where, and where it was taken up again."""
+
+import importlib.metadata
+import json
+import platform
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from jmorl.config import Config
+from jmorl.storage.versions import check_format
+
+FORMAT = 1
+PACKAGES = ("jmorl", "jax", "jaxlib", "flax", "optax", "numpy", "scipy", "moocore", "orbax-checkpoint")
+
+Manifest = dict[str, Any]
+
+
+def new_manifest(config: Config, parent: Manifest | None = None) -> Manifest:
+    """Of a run that begins here and now. `parent`: id, name and generation of the run that it branches off."""
+    program, *arguments = sys.argv
+    return {
+        "format": FORMAT,
+        "run": uuid.uuid4().hex,
+        "parent": parent,
+        "started": now(),
+        "command": [Path(program).name, *arguments],
+        "config": config.digest(),
+        "seed": config.seed,
+        "commit": _commit(),
+        **circumstances(),
+        "resumed": [],
+    }
+
+
+def circumstances() -> Manifest:
+    """What the last bits of a run's numbers may depend on."""
+    device = jax.devices()[0]
+    return {
+        "python": platform.python_version(),
+        "packages": {name: importlib.metadata.version(name) for name in PACKAGES},
+        "platform": platform.platform(),
+        "device": {"kind": device.device_kind, "platform": device.platform, "count": jax.device_count()},
+    }
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Raises OSError and ValueError if there is none that can be read, and NewerFormat."""
+    manifest: Manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    check_format(manifest, FORMAT, manifest.get("packages", {}).get("jmorl"), str(folder))
+    return manifest
+
+
+def differences(before: Manifest, here: Manifest) -> list[str]:
+    """In words, what is other than it was, of the circumstances that matter to numbers."""
+    changes = [
+        f"{name} {before['packages'].get(name)} is now {version}"
+        for name, version in here["packages"].items()
+        if before["packages"].get(name) != version
+    ]
+    for name, was in before["device"].items():
+        if here["device"][name] != was:
+            changes.append(f"device {name} {was} is now {here['device'][name]}")
+    return changes
+
+
+def now() -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+
+
+def _commit() -> str | None:
+    """The commit of the source tree, with a mark if it was changed since; None outside a repository."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return None

@@ -1,0 +1,165 @@
+"""The state of a run as a few arrays and one JSON document, and back.
+
+A state holds hundreds of policies with dozens of small arrays each, and every file or array costs more than its
+bytes. So each kind of number of all policies becomes one array, a row for each policy; what its columns are is in the
+document.
+Letters: N policies, M objectives, R records, F numbers of one kind in a snapshot.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import jax
+import numpy as np
+
+from envs.core import Environment
+from jmorl.config import Config
+from jmorl.learning.moppo import MOPPO
+from jmorl.run import RunState
+from jmorl.search.archive import Archive
+from jmorl.search.buffer import PerformanceBuffer
+from jmorl.search.policy import Policy
+from jmorl.search.prediction import Records
+
+COUNTERS = tuple(field.name for field in fields(RunState) if field.type is int)
+VECTORS = ("weights", "values", "spread", "discounted")  # of a policy, [M]
+
+
+class PackingError(ValueError):
+    """A packed state that does not fit the run it is unpacked for."""
+
+
+@dataclass(frozen=True)
+class PackedState:
+    """What a checkpoint keeps of a `RunState`."""
+
+    document: Mapping[str, Any]  # counters, who is where, and what the columns of the snapshots are
+    arrays: Mapping[str, np.ndarray]
+
+
+def pack(state: RunState) -> PackedState:
+    """The whole state, after the warm-up or later. Every policy that it mentions is kept once."""
+    assert state.reference_point is not None, "the warm-up sets it"
+    known = {policy.id: policy for policy in _mentioned(state)}
+    policies = [known[each] for each in sorted(known)]
+    document = {
+        "counters": {name: int(getattr(state, name)) for name in COUNTERS},
+        "policies": [
+            {"id": p.id, "generation": p.generation, "parent": p.parent, "predicted": p.predicted is not None}
+            for p in policies
+        ],
+        "archive": [policy.id for policy in state.archive.members],
+        "buffer": [policy.id for policy in state.buffer.members],
+        "choice": state.choice.id if state.choice else None,
+        "snapshot": _columns(policies[0].snapshot),
+    }
+    vectors = {name: np.stack([getattr(policy, name) for policy in policies]) for name in VECTORS}
+    nothing = np.full_like(policies[0].values, np.nan)
+    arrays = {
+        **vectors,
+        "predicted": np.stack([nothing if p.predicted is None else p.predicted for p in policies]),
+        "bounds": state.bounds,
+        "reference_point": state.reference_point,
+        **_packed_records(state.records),
+        **_packed([policy.snapshot for policy in policies]),
+    }
+    return PackedState(document, arrays)
+
+
+def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -> RunState:
+    """The state as it was, bit for bit.
+
+    Raises PackingError if its snapshots are not those of the learners that `config` describes.
+    """
+    document, arrays = packed.document, packed.arrays
+    learner = jax.eval_shape(MOPPO(environment, config.ppo).initial_learner, jax.eval_shape(jax.random.key, 0))
+    expected = _columns(learner)
+    if document["snapshot"] != expected:
+        raise PackingError(f"it has learners of another shape: {_first_difference(document['snapshot'], expected)}")
+    snapshots = _unpacked(arrays, len(document["policies"]), learner)
+    policies = {
+        origin["id"]: Policy(
+            id=origin["id"],
+            generation=origin["generation"],
+            parent=origin["parent"],
+            **{name: arrays[name][row].copy() for name in VECTORS},
+            snapshot=snapshots[row],
+            predicted=arrays["predicted"][row].copy() if origin["predicted"] else None,
+        )
+        for row, origin in enumerate(document["policies"])
+    }
+    buffer = tuple(policies[each] for each in document["buffer"])
+    choice = document["choice"]
+    return RunState(
+        buffer=PerformanceBuffer(config.search.buffer_bins, config.search.buffer_size, buffer),
+        records=_unpacked_records(arrays),
+        bounds=arrays["bounds"],
+        archive=Archive(tuple(policies[each] for each in document["archive"])),
+        reference_point=arrays["reference_point"],
+        choice=None if choice is None else policies[choice],
+        **document["counters"],
+    )
+
+
+def _mentioned(state: RunState) -> tuple[Policy, ...]:
+    return (*state.archive.members, *state.buffer.members, *([state.choice] if state.choice else []))
+
+
+def _packed_records(records: Records) -> dict[str, np.ndarray]:
+    """None before the first generation: Orbax refuses arrays without elements."""
+    return {f"records_{name}": array for name, array in vars(records).items() if len(array)}
+
+
+def _unpacked_records(arrays: Mapping[str, np.ndarray]) -> Records:
+    names = [f"records_{field.name}" for field in fields(Records)]
+    return Records(*(arrays[name] for name in names)) if names[0] in arrays else Records.empty(len(arrays["bounds"]))
+
+
+def _columns(snapshot: Any) -> list[list[Any]]:
+    """Name, kind and shape of every array in a snapshot, in the order of its tree."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(snapshot)
+    return [[jax.tree_util.keystr(path), str(np.dtype(leaf.dtype)), list(leaf.shape)] for path, leaf in leaves]
+
+
+def _packed(snapshots: Sequence[Any]) -> dict[str, np.ndarray]:
+    """For each kind of number one array [N, F]."""
+    rows = [jax.tree.leaves(snapshot) for snapshot in snapshots]
+    arrays = {}
+    for kind, indices in _kinds(rows[0]).items():
+        array = np.empty((len(rows), sum(rows[0][index].size for index in indices)), kind)
+        for row, numbers in zip(rows, array, strict=True):
+            np.concatenate([np.ravel(row[index]) for index in indices], out=numbers)
+        arrays[_array_name(kind)] = array
+    return arrays
+
+
+def _unpacked(arrays: Mapping[str, np.ndarray], count: int, learner: Any) -> list[Any]:
+    """The snapshots, shaped as `learner`. Each has its own memory, so that none keeps the others alive."""
+    leaves, tree = jax.tree.flatten(learner)
+    found: list[list[Any]] = [[None] * len(leaves) for _ in range(count)]
+    for kind, indices in _kinds(leaves).items():
+        ends = np.cumsum([leaves[index].size for index in indices])[:-1]
+        for row, numbers in enumerate(arrays[_array_name(kind)]):
+            for index, part in zip(indices, np.split(numbers, ends), strict=True):
+                found[row][index] = part.reshape(leaves[index].shape).copy()
+    return [jax.tree.unflatten(tree, each) for each in found]
+
+
+def _kinds(leaves: Sequence[Any]) -> dict[str, list[int]]:
+    """Which leaves hold which kind of number."""
+    kinds: dict[str, list[int]] = {}
+    for index, leaf in enumerate(leaves):
+        kinds.setdefault(str(np.dtype(leaf.dtype)), []).append(index)
+    return kinds
+
+
+def _array_name(kind: str) -> str:
+    return f"snapshot_{kind}"
+
+
+def _first_difference(stored: list[list[Any]], expected: list[list[Any]]) -> str:
+    for one, other in zip(stored, expected, strict=False):
+        if one != other:
+            return f"{one} where {other} belongs"
+    return f"{len(stored)} arrays where {len(expected)} belong"

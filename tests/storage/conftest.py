@@ -1,0 +1,67 @@
+"""States of runs made by hand: what is stored must come back, whatever it is."""
+
+import jax
+import numpy as np
+import pytest
+
+import envs
+from jmorl.learning.moppo import MOPPO
+from jmorl.run import RunState
+from jmorl.search.archive import Archive
+from jmorl.search.buffer import PerformanceBuffer
+from jmorl.search.policy import Policy
+from jmorl.search.prediction import Records
+
+
+@pytest.fixture(scope="package")
+def environment(small_config):
+    return envs.make(small_config.env)
+
+
+@pytest.fixture(scope="package")
+def make_policy(small_config, environment):
+    """A policy with random numbers in every place of its snapshot."""
+    shape = jax.eval_shape(MOPPO(environment, small_config.ppo).initial_learner, jax.random.key(0))
+
+    def make(number):
+        generator = np.random.default_rng(number)
+        draw = lambda leaf: (generator.normal(size=leaf.shape) * 1000).astype(leaf.dtype)  # noqa: E731
+        vectors = {name: generator.normal(size=3) for name in ("weights", "values", "spread", "discounted")}
+        warm_up = number < 4
+        return Policy(
+            id=number,
+            generation=number // 4,
+            parent=None if warm_up else number - 4,
+            snapshot=jax.tree.map(draw, shape),
+            predicted=None if warm_up else generator.normal(size=3),
+            **vectors,
+        )
+
+    return make
+
+
+@pytest.fixture
+def make_state(make_policy, small_config):
+    """The state after a generation: archive, buffer and choice share some of their policies."""
+
+    def make(generation):
+        generator = np.random.default_rng(generation)
+        policies = [make_policy(number) for number in range(4 * generation + 4)]
+        search = small_config.search
+        return RunState(
+            buffer=PerformanceBuffer(search.buffer_bins, search.buffer_size, tuple(policies[1:])),
+            records=Records(*generator.normal(size=(3, 4 * generation, 3))),
+            bounds=generator.normal(size=3) if generation else np.full(3, -np.inf),
+            archive=Archive((policies[3], policies[0], policies[-1])),
+            reference_point=generator.normal(size=3),
+            choice=policies[2] if generation else None,
+            silent_generations=generation,
+            generation=generation,
+            iterations=10 * generation,
+            evaluation_steps=2**40 + generation,
+            policies=len(policies),
+            questions=5,
+            policies_shown=17,
+        )
+
+    return make

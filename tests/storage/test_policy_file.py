@@ -1,0 +1,123 @@
+"""A policy as a file: it describes itself, and acts without this project."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+from jmorl.learning.moppo import MOPPO
+from jmorl.storage.policy_file import FORMAT, PolicyFileError, export_policy, load_policy, save_policy
+from jmorl.storage.versions import NewerFormat
+
+
+@pytest.fixture
+def saved(make_policy, environment, small_config, tmp_path):
+    """A run folder with one policy that is also its choice, and the learner in it."""
+    policy = make_policy(17)
+    (tmp_path / "run" / "policies").mkdir(parents=True)
+    learner = MOPPO(environment, small_config.ppo).initial_learner(jax.random.key(3))
+    statistics = learner.observation_statistics.replace(mean=np.float32([1, -2]), variance=np.float32([4, 0.25]))
+    learner = jax.device_get(learner.replace(observation_statistics=statistics))
+    policy = policy.__class__(**{**vars(policy), "snapshot": learner})
+    for name in ("chosen.npz", "policies/00017.npz"):
+        save_policy(tmp_path / "run" / name, policy, environment, small_config, "run-id")
+    return tmp_path / "run", policy
+
+
+def rewritten(path, change):
+    with np.load(path) as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"]))
+    change(header)
+    np.savez(path, **arrays | {"header": np.array(json.dumps(header))})
+
+
+def test_the_header_says_what_the_policy_is(saved, environment, small_config):
+    folder, policy = saved
+    header = load_policy(folder / "chosen.npz").header
+    assert header["environment"] == small_config.env
+    assert header["objectives"] == [vars(objective) for objective in environment.objectives]
+    assert (header["values"], header["spread"]) == (policy.values.tolist(), policy.spread.tolist())
+    assert header["weights"] == policy.weights.tolist()
+    assert header["network"]["sizes"] == [2, 64, 64, 2] and header["network"]["activation"] == "tanh"
+    assert header["run"] == {"id": "run-id", "config": small_config.digest(), "method": "interactive", "seed": 1}
+    assert (header["id"], header["generation"], header["parent"]) == (17, 4, 13)
+    assert header["format"] == FORMAT and header["jmorl"]
+
+
+def test_the_readmes_lines_act_as_the_policy_does_with_numpy_alone(saved, environment, small_config, tmp_path):
+    folder, policy = saved
+    readme = Path(__file__).parents[2].joinpath("README.md").read_text()
+    lines = re.search(r"```python\n(import json.*?policy\.npz.*?)```", readme, re.DOTALL)[1]
+    export_policy(folder, None, tmp_path / "policy.npz")
+    observations = np.random.default_rng(0).normal(scale=30, size=(50, 2)).round(3)
+    program = f"{lines}\nimport sys\nfor each in {observations.tolist()}:\n    print(act(each).tolist())\n"
+    program += "assert not {'jax', 'jmorl', 'envs', 'flax'} & set(sys.modules)\n"
+    printed = subprocess.run(
+        [sys.executable, "-I", "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
+    actions = np.array([json.loads(line) for line in printed.splitlines()])
+    acting = MOPPO(environment, small_config.ppo).policy(policy.snapshot)
+    expected = np.array([np.clip(acting(each.astype(np.float32))[0], -1, 1) for each in observations])
+    np.testing.assert_allclose(actions, expected, atol=1e-5)
+    np.testing.assert_allclose(load_policy(folder / "chosen.npz")(observations), expected, atol=1e-5)
+    assert np.ptp(expected, axis=0).min() > 1e-3
+
+
+@pytest.mark.parametrize(("policy_id", "source"), [(None, "chosen.npz"), (17, "policies/00017.npz")])
+def test_an_exported_policy_is_the_runs_file(saved, tmp_path, policy_id, source):
+    folder, _ = saved
+    assert export_policy(folder, policy_id, tmp_path / "out.npz").header["id"] == 17
+    assert (tmp_path / "out.npz").read_bytes() == (folder / source).read_bytes()
+
+
+def test_an_export_overwrites_nothing_unless_told(saved, tmp_path):
+    folder, _ = saved
+    target = tmp_path / "out.npz"
+    target.write_text("dear")
+    with pytest.raises(PolicyFileError, match="out.npz exists; choose another file, or overwrite it with --force"):
+        export_policy(folder, None, target)
+    assert target.read_text() == "dear"
+    export_policy(folder, None, target, force=True)
+    assert load_policy(target).header["id"] == 17
+    with pytest.raises(PolicyFileError, match="is a folder; name a file"):
+        export_policy(folder, None, tmp_path, force=True)
+
+
+@pytest.mark.parametrize(
+    ("policy_id", "target", "message"),
+    [(5, "out.npz", "has no policy 5"), (17, "nowhere/out.npz", "cannot be written: No such file")],
+)
+def test_what_cannot_be_exported_says_why_and_leaves_nothing(saved, tmp_path, policy_id, target, message):
+    with pytest.raises(PolicyFileError, match=message):
+        export_policy(saved[0], policy_id, tmp_path / target)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_damaged_file_is_not_exported(saved, tmp_path):
+    path = saved[0] / "policies" / "00017.npz"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(PolicyFileError, match="00017.npz is not a policy file"):
+        export_policy(saved[0], 17, tmp_path / "out.npz")
+
+
+def test_a_newer_format_is_refused_with_the_version_that_wrote_it(saved):
+    path = saved[0] / "chosen.npz"
+    rewritten(path, lambda header: header.update(format=FORMAT + 1, jmorl="8.8"))
+    with pytest.raises(NewerFormat, match=f"format {FORMAT + 1}, written by jmorl 8.8"):
+        load_policy(path)
+
+
+def test_a_file_of_before_networks_were_described_acts_the_same(saved):
+    path = saved[0] / "chosen.npz"
+    observations = np.random.default_rng(0).normal(size=(9, 2))
+    actions = load_policy(path)(observations)
+    rewritten(path, lambda header: header.pop("network"))
+    np.testing.assert_array_equal(load_policy(path)(observations), actions)

@@ -1,0 +1,75 @@
+"""A branch shares its parent's past and goes its own way."""
+
+import json
+import shutil
+from dataclasses import replace
+
+import pytest
+
+from jmorl.storage.continuing import CannotContinue, branch, resume
+from jmorl.storage.lock import FolderInUse
+from tests.resuming import Counting, follow, go_on, outcome, train
+
+
+def test_a_branch_shares_the_past_and_decides_for_itself(whole, tmp_path):
+    continued = branch(whole, 1, tmp_path / "new", "weights=0,0,1")
+    path = follow(continued)
+    decisions = [(folder / "decisions.jsonl").read_text().splitlines() for folder in (whole, path)]
+    assert decisions[0][0] == decisions[1][0] and len(decisions[1]) == 4
+    assert decisions[0][1:] != decisions[1][1:]
+    for name, rows in (("policies.csv", 8), ("metrics.csv", 2)):
+        lines = [(folder / name).read_bytes().splitlines() for folder in (whole, path)]
+        assert lines[0][: rows + 1] == lines[1][: rows + 1] and lines[0] != lines[1]
+    manifest = json.loads((path / "manifest.json").read_text())
+    parent = json.loads((whole / "manifest.json").read_text())["run"]
+    assert manifest["parent"] == {"run": parent, "name": "whole", "generation": 1}
+    assert manifest["run"] != parent
+
+
+def test_a_branch_with_the_same_user_ends_the_same_even_if_it_is_resumed(whole, tmp_path):
+    continued = branch(whole, 1, tmp_path / "new")
+    path = follow(continued, events=3)
+    go_on(path)
+    (path / "checkpoints" / "00000").symlink_to(whole / "checkpoints" / "00000")  # a branch has none before its own
+    assert outcome(path)[1:] == outcome(whole)[1:]
+
+
+def test_a_branch_asks_at_once(whole, small_config, tmp_path):
+    class Silent(Counting):
+        def answer(self, question):
+            return replace(super().answer(question), generations=3)
+
+    path = train(tmp_path / "run", small_config, user=Silent(small_config))
+    continued = branch(path, 1, tmp_path / "new")
+    user = Counting(small_config)
+    follow(continued, user=user)
+    assert user.asked[0] == ("steer", 2)
+
+
+@pytest.mark.parametrize(
+    ("how", "error", "message"),
+    [
+        ({"generation": 9}, CannotContinue, "has no checkpoint of generation 9, only of: 0, 1, 2, 3"),
+        ({"out": "used"}, FolderInUse, "used is not empty, and not a run"),
+    ],
+)
+def test_a_branch_that_cannot_be_made_says_why_and_makes_nothing(whole, tmp_path, how, error, message):
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "letter").touch()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(error, match=message):
+        branch(whole, how.get("generation", 1), tmp_path / how.get("out", "new"))
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_branch_never_overwrites_its_parent(whole):
+    with pytest.raises(FolderInUse, match="holds the run that is branched off"):
+        branch(whole, 1, whole, force=True)
+    assert (whole / "policies.csv").exists()
+
+
+def test_a_branch_without_a_checkpoint_does_not_begin_as_another_run(whole, tmp_path):
+    branch(whole, 1, tmp_path / "new").folder.close()
+    shutil.rmtree(tmp_path / "new" / "checkpoints")
+    with pytest.raises(CannotContinue, match="branch off whole again"):
+        resume(tmp_path / "new")
