@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 DEMO_OUT ?= runs/demo
 INSTALLED := $(VENV)/.installed
 
-.PHONY: demo test check format bench quality clean
+.PHONY: demo test test-slow check format bench bench-physics bench-checkpoints quality clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
@@ -13,6 +13,9 @@ demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and
 
 test: $(INSTALLED)  ## the test suite (a few minutes)
 	$(BIN)/python -m pytest
+
+test-slow: $(INSTALLED)  ## the tests that take minutes each: physics, interrupted runs, learning
+	$(BIN)/python -m pytest -m slow
 
 check: $(INSTALLED)  ## lint, format and types
 	$(BIN)/ruff check .
@@ -25,6 +28,12 @@ format: $(INSTALLED)
 
 bench: $(INSTALLED)  ## speed and memory, beside morl-baselines; the first time it installs that (gigabytes) in .venv-peer
 	$(BIN)/python -m benchmarks.speed
+
+bench-checkpoints: $(INSTALLED)  ## what checkpoints cost, as a share of a generation
+	$(BIN)/python -m benchmarks.checkpoints
+
+bench-physics: $(INSTALLED)  ## accuracy and speed of the half cheetah's dynamics, beside MuJoCo and MJX (5 minutes)
+	$(BIN)/python -m benchmarks.physics
 
 quality: $(INSTALLED)  ## how good the found policies are against the exact front: 5 seeds, 3 users, 2 methods
 	$(BIN)/python -m benchmarks.quality
