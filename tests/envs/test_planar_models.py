@@ -112,7 +112,7 @@ REFUSED = [
     ("joint 'x': not a slide along (1, 0, 0)", X, 'type="slide" axis="0 1 0"'),
     ("joint 'x': a limit on a slide", X, X + ' limited="true" range="-1 1"'),
     ("joint 'swing': not a hinge along (0, 1, 0)", JOINT, '<joint name="swing" axis="0 1 0.1"'),
-    ("body 'head': 2 joints, not 1", JOINT, '<joint type="ball"/>' + JOINT),
+    ("body 'head': 2 joints, not 1", JOINT, '<joint name="other" axis="0 1 0"/>' + JOINT),
     ("joint 'swing': not a hinge along (0, 1, 0)", JOINT, '<joint name="swing" type="slide" axis="1 0 0"'),
     ("joint 'swing': solref in direct form", JOINT, JOINT + ' solreflimit="-100 -1"'),
     ("joint 'swing': a limit margin", JOINT, JOINT + ' margin="0.1"'),
