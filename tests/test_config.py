@@ -32,7 +32,7 @@ OTHER = {
     "ppo.rollout_steps": 2000,
     "ppo.epochs": 5,
     "ppo.minibatches": 16,
-    "ppo.learning_rate": 1e-3,
+    "ppo.learning_rate": 2e-3,
     "ppo.final_learning_rate": 1e-4,
     "ppo.adam_epsilon": 1e-8,
     "ppo.discount": 0.98,
