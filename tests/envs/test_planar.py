@@ -47,9 +47,8 @@ def single(visited):
 
 
 def errors(qvel, steps: Steps) -> np.ndarray:  # [N]
-    """Greatest velocity error of each state, none of them large, nor large beside the state's speed."""
+    """Greatest velocity error of each state, none of them large beside the state's speed."""
     error: np.ndarray = np.abs(qvel - steps.next_qvel).max(axis=1)
-    assert error.max() < 1e-2
     assert (error / np.maximum(1, np.abs(steps.next_qvel).max(axis=1))).max() < 1e-3
     return error
 
@@ -58,7 +57,10 @@ def test_velocities_in_single_precision(single, visited):
     error = errors(single.qvel, visited)
     assert np.median(error) < 1e-5
     assert np.quantile(error[:-COUNT], 0.999) < 1e-3
-    assert np.quantile(error[-COUNT:], 0.99) < 2e-3  # forces are of another order where all is violent
+    assert error[:-COUNT].max() < 1e-2
+    # Underground and fast, velocities change by 20 to 50 rad/s in a time step, and rounding is in proportion.
+    assert np.quantile(error[-COUNT:], 0.98) < 1e-3
+    assert error.max() < 2e-2
 
 
 def test_far_away_only_x_loses_digits(single, visited):
@@ -78,6 +80,7 @@ def test_a_hundred_thousand_states(kind):
     error = errors(one_step(MODEL, states_of(steps), np.float32).qvel, steps)
     assert np.median(error) < 1e-5
     assert np.quantile(error, 0.98 if kind == "violent" else 0.999) < 1e-3
+    assert error.max() < (2e-2 if kind == "violent" else 1e-2)
     after = one_step(MODEL, states_of(steps), np.float64)
     assert relative_difference(after.qvel, steps.next_qvel).max() < 1e-9
     assert relative_difference(after.qpos, steps.next_qpos).max() < 1e-9
