@@ -236,7 +236,7 @@ def tables(report: dict[str, Any]) -> Iterator[Table]:
     accuracy = Table("states", *errors, title=f"Error of the velocity after a time step, {STATES:,} states a row")
     for kind, types in report["accuracy"].items():
         for dtype, row in types.items():
-            accuracy.add_row(f"{kind}, {dtype}", *(f"{row[column]:.2g}" for column in errors))
+            accuracy.add_row(f"{kind}, {dtype}", *(f"{row[column]:.4g}" for column in errors))
     yield accuracy
     misses = Table("Newton steps", *errors, title="The same with so many plain Newton steps, float64, all states")
     for row in report["fixed_steps"]:
