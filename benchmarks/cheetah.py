@@ -11,7 +11,6 @@ mean undiscounted returns of deterministic episodes of 1,000 steps, 50 seconds. 
 import argparse
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +18,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.variants import add_variant
-from jmorl.config import Config, resolve
+from benchmarks.arms import add_arms, arms
+from jmorl.config import Config
 from jmorl.decision.utility import USERS
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.run import Compiled, GenerationFinished, run
 
 ENVIRONMENT = "mo-halfcheetah-v5"
-SEEDS = (1, 7, 10, 42, 100)
 STEPS_OF_AN_EPISODE = 1000
 RUNNING = 1.0  # m/s: what is slower is not called running
 WEIGHTS = np.array(list(USERS.values()))  # [3, 2]
@@ -35,37 +33,18 @@ RESULT = Path(__file__).with_name("cheetah.json")
 
 def main() -> None:
     """Run everything that is asked for, print the tables and write the result after every run."""
-    options = _options()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_arms(parser, RESULT)
+    options = parser.parse_args()
     use_all_cpu_cores()
     rows: list[dict[str, Any]] = []
-    for seed in options.seeds:
-        for method, user in _arms(options):
-            overrides = {"env": ENVIRONMENT, "method": method, "user": user, "seed": seed}
-            config = resolve(options.preset, None, overrides).replace(**options.set)
-            rows.append(_judged(config))
-            print(json.dumps({name: rows[-1][name] for name in ("method", "user", "seed", "utility")}), flush=True)
-            report = {"preset": options.preset, "set": options.set, "rows": rows}
-            options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    for config in arms(options, ENVIRONMENT):
+        rows.append(_judged(config))
+        print(json.dumps({name: rows[-1][name] for name in ("method", "user", "seed", "utility")}), flush=True)
+        report = {"preset": options.preset, "set": options.set, "rows": rows}
+        options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     for table in tables(rows):
         Console().print(table)
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
-    parser.add_argument("--users", nargs="+", choices=USERS, default=list(USERS))
-    parser.add_argument("--methods", nargs="+", choices=("pgmorl", "interactive"), default=["pgmorl", "interactive"])
-    parser.add_argument("--out", type=Path, default=RESULT)
-    add_variant(parser)
-    return parser.parse_args()
-
-
-def _arms(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """Method and user of each run; PGMORL asks nobody, so one run serves all users."""
-    if "pgmorl" in options.methods:
-        yield "pgmorl", "A"
-    if "interactive" in options.methods:
-        yield from (("interactive", user) for user in options.users)
 
 
 def _judged(config: Config) -> dict[str, Any]:

@@ -12,7 +12,6 @@ import argparse
 import functools
 import json
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +22,9 @@ from rich.progress import track
 from rich.table import Table
 
 import envs
+from benchmarks.arms import add_arms, arms
 from benchmarks.exact_front import exact_front
-from jmorl.config import Config, resolve
+from jmorl.config import Config
 from jmorl.decision.utility import USERS
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.moppo import MOPPO
@@ -32,7 +32,6 @@ from jmorl.run import GenerationFinished, RunFinished, evaluation_keys, run
 from jmorl.search.policy import Policy, values_of
 
 ENVIRONMENT = "mo-mountaincarcontinuous-v0"
-SEEDS = (1, 7, 10, 42, 100)
 FRESH_EPISODES, FRESH_SEED = 100, 12345
 CLOSE = 5.0  # per cent: steps are counted until the best utility is this close
 WEIGHTS = np.array(list(USERS.values()))  # [3, 2]
@@ -43,12 +42,10 @@ def main() -> None:
     """Run everything that is asked for, print the table and write the result."""
     options = _options()
     use_all_cpu_cores()
-    runs = [(method, user, seed) for seed in options.seeds for method, user in _arms(options)]
+    configs = list(arms(options, ENVIRONMENT))
     rows: list[dict[str, Any]] = []
-    for method, user, seed in track(runs, console=Console(stderr=True), disable=not sys.stderr.isatty()):
-        overrides = {"env": ENVIRONMENT, "method": method, "user": user, "seed": seed}
-        config = resolve(options.preset, None, overrides).replace(**options.set)
-        rows += _judged(config, options.users if method == "pgmorl" else [user])
+    for config in track(configs, console=Console(stderr=True), disable=not sys.stderr.isatty()):
+        rows += _judged(config, options.users if config.method == "pgmorl" else [config.user])
         if options.verbose:
             print(json.dumps(rows[-1]), flush=True)
         report = {"preset": options.preset, "set": options.set, "rows": rows}  # after every run: none is lost
@@ -59,33 +56,9 @@ def main() -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
-    parser.add_argument("--users", nargs="+", choices=USERS, default=list(USERS))
-    parser.add_argument("--methods", nargs="+", choices=("pgmorl", "interactive"), default=["pgmorl", "interactive"])
-    parser.add_argument("--preset", default="default")
-    parser.add_argument("--set", type=_setting, nargs="+", default=[], metavar="SECTION.NAME=VALUE")
-    parser.add_argument("--out", type=Path, default=RESULT)
+    add_arms(parser, RESULT)
     parser.add_argument("--verbose", action="store_true", help="print a line after each run")
-    options = parser.parse_args()
-    merged: dict[str, Any] = {}
-    for section, name, value in options.set:
-        merged.setdefault(section, {})[name] = value
-    options.set = merged
-    return options
-
-
-def _setting(text: str) -> tuple[str, str, str]:
-    name, _, value = text.partition("=")
-    section, _, field = name.partition(".")
-    return section, field, value
-
-
-def _arms(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """Method and user of each run; PGMORL asks nobody, so one run serves all users."""
-    if "pgmorl" in options.methods:
-        yield "pgmorl", options.users[0]
-    if "interactive" in options.methods:
-        yield from (("interactive", user) for user in options.users)
+    return parser.parse_args()
 
 
 def _judged(config: Config, users: list[str]) -> list[dict[str, Any]]:

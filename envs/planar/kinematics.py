@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from envs.planar.model import PlanarModel
-from envs.planar.tree import constant, pick
+from envs.planar.tree import at_slots, constant, pick
 
 
 class Kinematics(NamedTuple):
@@ -43,9 +43,7 @@ def kinematics(model: PlanarModel, qpos: jax.Array, qvel: jax.Array) -> Kinemati
         slot = above.first_slot[level.parent]
         offset = _turned(level.anchor, pick(cosine, slot), pick(sine, slot))
         hinges.append(pick(hinges[-1], level.parent) + offset * pick(rates, slot))
-    origins = jnp.concatenate(
-        [_at_slots(hinge, level.slot_body) for hinge, level in zip(hinges, model.levels, strict=True)], axis=-2
-    )
+    origins = at_slots(model, hinges)
     centre = origins[:2] + _turned(model.slot_centre, cosine, sine)[:2] * rates[:2]
     ends = origins[::2, :, None] + _turned(model.slot_ends, cosine, sine)[::2] * rates[::2, :, None]
     return Kinematics(
@@ -68,15 +66,8 @@ def _angles(model: PlanarModel, qpos: jax.Array, qvel: jax.Array) -> tuple[jax.A
         rest = np.stack([model.angle[level.bodies], np.zeros_like(model.angle[level.bodies])])
         own = own + constant(rest, qpos)
         levels.append(own + pick(levels[-1], level.parent) if levels else own)
-    at_slots = [_at_slots(turn, level.slot_body) for turn, level in zip(levels, model.levels, strict=True)]
-    angle, turning = jnp.concatenate(at_slots, axis=-2)
+    angle, turning = at_slots(model, levels)
     return angle, turning
-
-
-def _at_slots(values: jax.Array, slot_body: np.ndarray) -> jax.Array:
-    """A level's bodies' values [..., bodies, batch] at its slots."""
-    picked = pick(values, slot_body)
-    return jnp.broadcast_to(picked, (*picked.shape[:-2], len(slot_body), picked.shape[-1]))
 
 
 def _turned(offset: np.ndarray, cosine: jax.Array, sine: jax.Array) -> jax.Array:

@@ -23,7 +23,7 @@ from envs.planar.constraints import (
 )
 from envs.planar.kinematics import Kinematics
 from envs.planar.model import Level, PlanarModel
-from envs.planar.tree import constant, pick, total
+from envs.planar.tree import at_slots, constant, pick, total
 
 FULL_STEPS = 8  # of Newton; whatever goes on longer may be cycling, and minds the cost from then on
 MAXIMAL_STEPS = 40
@@ -72,15 +72,7 @@ def accelerations(
         x, z = anchors[depth]
         motions.append(above + jnp.stack([turn, -z * turn, x * turn]))
         qacc.append(constant(model.hinge_sign[level.bodies], turn) * turn)
-    return jnp.concatenate(qacc), _at_slots(model, motions)
-
-
-def _at_slots(model: PlanarModel, motions: list[jax.Array]) -> jax.Array:
-    slots = []
-    for motion, level in zip(motions, model.levels, strict=True):
-        picked = pick(motion, level.slot_body)
-        slots.append(jnp.broadcast_to(picked, (3, len(level.slot_body), motion.shape[-1])))
-    return jnp.concatenate(slots, axis=-2)
+    return jnp.concatenate(qacc), at_slots(model, motions)
 
 
 def _bodies(slots: jax.Array, level: Level) -> jax.Array:

@@ -1,8 +1,12 @@
 """Moving arrays [..., n, batch] along the tree, with indices known when the program is traced."""
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+
+from envs.planar.model import PlanarModel
 
 
 def pick(values: jax.Array, index: np.ndarray) -> jax.Array:  # [..., n, batch] -> [..., len(index), batch]
@@ -21,6 +25,15 @@ def total(values: jax.Array, index: np.ndarray, size: int) -> jax.Array:  # [...
         return values
     sums = [sum(values[..., int(i), :] for i in np.flatnonzero(index == bin)) for bin in range(size)]
     return jnp.stack([jnp.broadcast_to(each, values[..., 0, :].shape) for each in sums], axis=-2)
+
+
+def at_slots(model: PlanarModel, levels: Sequence[jax.Array]) -> jax.Array:  # [..., slots, batch]
+    """What each level's bodies have, [..., bodies, batch], at all slots."""
+    slots = []
+    for values, level in zip(levels, model.levels, strict=True):
+        picked = pick(values, level.slot_body)
+        slots.append(jnp.broadcast_to(picked, (*picked.shape[:-2], len(level.slot_body), picked.shape[-1])))
+    return jnp.concatenate(slots, axis=-2)
 
 
 def constant(values: np.ndarray, like: jax.Array) -> jax.Array:  # [..., n] -> [..., n, 1]

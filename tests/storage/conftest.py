@@ -25,7 +25,10 @@ def make_policy(small_config, environment):
 
     def make(number):
         generator = np.random.default_rng(number)
-        draw = lambda leaf: (generator.normal(size=leaf.shape) * 1000).astype(leaf.dtype)  # noqa: E731
+
+        def draw(leaf):
+            return (generator.normal(size=leaf.shape) * 1000).astype(leaf.dtype)
+
         vectors = {name: generator.normal(size=3) for name in ("weights", "values", "spread", "discounted")}
         warm_up = number < 4
         return Policy(
