@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 import envs
-from jmorl.config import Config, resolve
+from jmorl.config import resolve
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.population import Population
 from jmorl.run import Compiled, GenerationFinished, evaluation_keys, run
@@ -39,6 +39,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 PEER_PYTHON = ROOT / ".venv-peer" / "bin" / "python"
 REPEATS = 3
+SCALED_ITERATIONS = 2  # in a timed call, where sizes are compared
 
 
 def main() -> None:
@@ -148,48 +149,50 @@ def selection(candidates: int) -> dict[str, Any]:
 
 
 def scaling(env: str) -> list[dict[str, Any]]:
-    """What an agent, and an environment, costs in an iteration as there are more of them."""
+    """What an agent, and an environment, costs in an iteration as there are more of them.
+
+    The sizes take turns, so that a machine that slows down meanwhile slows all of them.
+    """
+    sizes = ((6, 4), (24, 4), (96, 4), (6, 64))
+    trainings = [_training(env, agents, environments) for agents, environments in sizes]
+    rounds = [[_seconds(train) for train in trainings] for _ in range(REPEATS + 1)]
     rows = []
-    for agents, environments in ((6, 4), (24, 4), (96, 4), (6, 64)):
-        config = resolve("paper", None, {"env": env}).replace(
-            population={"agents": agents}, ppo={"environments": environments}, steps=10**9
-        )
-        seconds = _iteration_seconds(config, iterations=2)
+    for (agents, environments), seconds in zip(sizes, np.median(rounds[1:], axis=0) / SCALED_ITERATIONS, strict=True):
+        steps = resolve("paper", None, {"env": env}).ppo.rollout_steps * agents * environments
         rows.append(
             {
                 "agents": agents,
                 "environments": environments,
                 "iteration_seconds": round(seconds, 3),
                 "milliseconds_per_agent": round(1e3 * seconds / agents, 2),
-                "microseconds_per_step": round(1e6 * seconds / config.steps_per_iteration, 2),
+                "microseconds_per_step": round(1e6 * seconds / steps, 2),
             }
         )
     return rows
 
 
-def _iteration_seconds(config: Config, iterations: int) -> float:
-    """One training iteration of the whole population."""
+def _training(env: str, agents: int, environments: int) -> Callable[[], Any]:
+    """Some training iterations of a whole population, compiled."""
+    config = resolve("paper", None, {"env": env}).replace(
+        population={"agents": agents}, ppo={"environments": environments}, steps=10**9
+    )
     population = Population(envs.make(config.env), config)
     population.compile(evaluation_keys(config))
     learners = population.initialize(jax.random.key(0))
-    weights = spread_weights(2, config.population.agents)
-    rate = config.ppo.learning_rate
-
-    def train() -> None:
-        population.train(learners, weights, jax.random.key(1), iterations, rate)
-
-    return _median_seconds(train) / iterations
+    weights = spread_weights(2, agents)
+    return lambda: population.train(learners, weights, jax.random.key(1), SCALED_ITERATIONS, config.ppo.learning_rate)
 
 
 def _median_seconds(call: Callable[[], Any]) -> float:
     """Of three calls, after one that is not counted."""
+    _seconds(call)
+    return statistics.median(_seconds(call) for _ in range(REPEATS))
+
+
+def _seconds(call: Callable[[], Any]) -> float:
+    started = time.perf_counter()
     jax.block_until_ready(call())
-    seconds = []
-    for _ in range(REPEATS):
-        started = time.perf_counter()
-        jax.block_until_ready(call())
-        seconds.append(time.perf_counter() - started)
-    return statistics.median(seconds)
+    return time.perf_counter() - started
 
 
 def peer(env: str) -> dict[str, Any]:
