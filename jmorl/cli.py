@@ -113,16 +113,18 @@ def _follow(continued: "Continued", user: DecisionMaker | None, options: argpars
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.run_folder import folder_bytes
     from jmorl.storage.stored_run import read_run
+    from jmorl.units import measured_in
 
     console = Console()
     kind = "json" if options.json else "quiet" if options.quiet else "live" if console.is_terminal else "lines"
     for note in continued.notes:
         print(f"jmorl: {note}", file=sys.stderr)
     path, config = continued.folder.path, continued.folder.config
+    objectives = measured_in(config.evaluation.units, continued.folder.environment.objectives)
     try:
         with (
-            continued.folder as folder,
-            watcher(kind, config, folder.environment.objectives, console) as watching,
+            continued.folder,
+            watcher(kind, config, objectives, console) as watching,
             StopSignals() as stop,
         ):
             for event in continued.events(user, stop.asking):

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -35,7 +36,8 @@ class Population:
         mesh = Mesh(np.array(self.devices), (AGENTS,))
         self._initialize = jax.jit(jax.vmap(self.moppo.initial_learner))
         self._train = _sharded(self.moppo.train, mesh)
-        self._evaluate = _sharded(self.moppo.evaluate, mesh)
+        sampled, traced = config.evaluation.actions == "sampled", config.evaluation.units == "paper"
+        self._evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
 
     def compile(self, start_keys: jax.Array) -> float:
         """Compile both calls, for evaluation from as many start keys [episodes]. Returns the seconds it took.
@@ -71,7 +73,7 @@ class Population:
         return learners, diagnostics
 
     def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        """Returns [P, episodes, M] of every learner from the same start keys [episodes].
+        """Returns [P, episodes, M] of every learner from the same keys [episodes], with traces for paper units.
 
         Raises TrainingFault, naming the agents, if a return is not finite.
         """
