@@ -144,16 +144,18 @@ def run(
     decision_maker: DecisionMaker | None = None,
     environment: Environment[Any] | None = None,
     state: RunState | None = None,
+    population: Population | None = None,
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
+    A `population` of the same environment and sections of the config, left by another run, need not be compiled anew.
     Raises TrainingFault in the generation in which a number stops being finite; the events before it stand.
     """
     environment = environment or envs.make(config.env)
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
-    return _Run(config, environment, decision_maker).events(state)
+    return _Run(config, environment, decision_maker, population or Population(environment, config)).events(state)
 
 
 def evaluation_keys(config: Config, evaluated: int = 0) -> jax.Array:
@@ -176,11 +178,13 @@ def _keys(config: Config) -> jax.Array:
 class _Run:
     """What stays the same during a run, and the steps it is made of."""
 
-    def __init__(self, config: Config, environment: Environment[Any], decision_maker: DecisionMaker):
+    def __init__(
+        self, config: Config, environment: Environment[Any], decision_maker: DecisionMaker, population: Population
+    ):
         self.config = config
         self.environment = environment
         self.decision_maker = decision_maker
-        self.population = Population(environment, config)
+        self.population = population
         self.candidate_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
         self.objectives = measured_in(config.evaluation.units, environment.objectives)
         self.initial_key, self.training_key, _ = _keys(config)

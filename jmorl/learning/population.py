@@ -31,6 +31,7 @@ class Population:
     def __init__(self, environment: Environment[Any], config: Config):
         _check_shapes(environment)
         self.size = config.population.agents
+        self._compiled = False
         self.moppo = MOPPO(environment, config.ppo)
         self.devices = jax.devices()[: device_count(self.size, jax.device_count())]
         mesh = Mesh(np.array(self.devices), (AGENTS,))
@@ -42,14 +43,17 @@ class Population:
     def compile(self, start_keys: jax.Array) -> float:
         """Compile both calls, for evaluation from as many start keys [episodes]. Returns the seconds it took.
 
-        What is called afterwards are these programs: nothing is traced or compiled again.
+        What is called afterwards are these programs: nothing is traced or compiled again, not by this method either.
         """
+        if self._compiled:
+            return 0.0
         started = time.perf_counter()
         keys = jax.random.split(start_keys[0], self.size)
         learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys)
         weights = np.zeros((self.size, len(self.moppo.environment.objectives)), np.float32)
         self._train = self._train.lower(learners, weights, keys, _schedule(0, 0.0)).compile()
         self._evaluate = self._evaluate.lower(learners, start_keys).compile()
+        self._compiled = True
         return time.perf_counter() - started
 
     def initialize(self, key: jax.Array) -> Learner:
