@@ -32,6 +32,10 @@ MAY_IMPORT = {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
         *("jmorl.run", "jmorl.search", "jmorl.storage"),
     },
+    "jmorl.paper": {
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.run"),
+        *("jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
+    },
 }
 JAX = {"jax", "flax", "optax", "chex"}
 

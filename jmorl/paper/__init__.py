@@ -1,0 +1,1 @@
+"""The paper's experiments, in its units and in honest ones."""
