@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 DEMO_OUT ?= runs/demo
 INSTALLED := $(VENV)/.installed
 
-.PHONY: demo test test-slow check format bench bench-physics bench-checkpoints quality clean
+.PHONY: demo test test-slow check format bench bench-physics bench-checkpoints quality paper clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
@@ -37,6 +37,9 @@ bench-physics: $(INSTALLED)  ## accuracy and speed of the half cheetah's dynamic
 
 quality: $(INSTALLED)  ## how good the found policies are against the exact front: 5 seeds, 3 users, 2 methods
 	$(BIN)/python -m benchmarks.quality
+
+paper: $(INSTALLED)  ## the paper's experiments in its units and in raw ones: hours; goes on where it was interrupted
+	$(BIN)/jmorl paper
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)

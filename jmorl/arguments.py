@@ -7,6 +7,7 @@ from typing import Any
 from jmorl.config import PRESETS, Config, Section
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
+PAPER_ITEMS = ("table1", "fig5", "fig6", "fig9", "fig10", "table2", "fig7", "fig8", "fig11", "targets")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -48,6 +49,8 @@ def parser() -> argparse.ArgumentParser:
     show = commands.add_parser("show", help="print a run's tables and draw its plots")
     show.add_argument("run", type=Path, metavar="RUN", help="run folder")
 
+    _add_paper(commands)
+
     commands.add_parser("envs", help="list the environments")
     return whole
 
@@ -65,6 +68,22 @@ def _add_train(commands: Any) -> None:
     train.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
     _add_output(train)
     _add_settings(train, train.add_argument_group("settings"), Config, "")
+
+
+def _add_paper(commands: Any) -> None:
+    paper = commands.add_parser(
+        "paper",
+        help="repeat the paper's experiments, and write the report",
+        description="Runs that are done are skipped, one that was interrupted goes on, and the report says what is "
+        "missing. Raw units come first.",
+    )
+    paper.add_argument("--only", type=_items, metavar="ITEM,...", help=f"of {', '.join(PAPER_ITEMS)} (default: all)")
+    paper.add_argument("--units", choices=["raw", "paper", "both"], default="both", help="default: both")
+    paper.add_argument("--seeds", type=_seeds, metavar="SEED,...", help="default: the paper's")
+    paper.add_argument("--quick", action="store_true", help="all of it at a tiny size, to see that it works")
+    paper.add_argument("--report", action="store_true", help="make no runs, only the report of those there are")
+    paper.add_argument("--out", type=Path, metavar="FOLDER", help="default: benchmarks/paper, or runs/paper-quick")
+    paper.add_argument("--work", type=Path, metavar="FOLDER", help="run folders (default: runs/paper, or OUT/work)")
 
 
 def _add_continuing(commands: Any) -> None:
@@ -124,6 +143,18 @@ def _count(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1, not {number}")
     return number
+
+
+def _items(text: str) -> list[str]:
+    items = text.split(",")
+    unknown = [item for item in items if item not in PAPER_ITEMS]
+    if unknown:
+        raise argparse.ArgumentTypeError(f"unknown {', '.join(unknown)}; known: {', '.join(PAPER_ITEMS)}")
+    return items
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    return tuple(int(word) for word in text.split(","))
 
 
 def _size(text: str) -> int:

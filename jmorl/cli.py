@@ -33,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from jmorl.decision.records import ScriptError
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
+    from jmorl.paper.record import RecordError
     from jmorl.playback import PlaybackError
     from jmorl.scoring import NotInGymnasium
     from jmorl.storage.checkpoints import CheckpointError
@@ -42,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from jmorl.storage.stored_run import StoredRunError
     from jmorl.storage.versions import NewerFormat
 
-    wrong_place = (CannotContinue, FolderInUse, NewerFormat, PolicyFileError, StoredRunError)
+    wrong_place = (CannotContinue, FolderInUse, NewerFormat, PolicyFileError, RecordError, StoredRunError)
     use_all_cpu_cores()
     try:
         COMMANDS[options.command](options)
@@ -113,16 +114,18 @@ def _follow(continued: "Continued", user: DecisionMaker | None, options: argpars
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.run_folder import folder_bytes
     from jmorl.storage.stored_run import read_run
+    from jmorl.units import measured_in
 
     console = Console()
     kind = "json" if options.json else "quiet" if options.quiet else "live" if console.is_terminal else "lines"
     for note in continued.notes:
         print(f"jmorl: {note}", file=sys.stderr)
     path, config = continued.folder.path, continued.folder.config
+    objectives = measured_in(config.evaluation.units, continued.folder.environment.objectives)
     try:
         with (
-            continued.folder as folder,
-            watcher(kind, config, folder.environment.objectives, console) as watching,
+            continued.folder,
+            watcher(kind, config, objectives, console) as watching,
             StopSignals() as stop,
         ):
             for event in continued.events(user, stop.asking):
@@ -263,6 +266,14 @@ def _show(options: argparse.Namespace) -> None:
         console.print(f"plot: {plot}", soft_wrap=True, highlight=False)
 
 
+def _paper(options: argparse.Namespace) -> None:
+    from jmorl.paper.command import make_paper
+
+    units = ("raw", "paper") if options.units == "both" else (options.units,)
+    run, out, work = not options.report, options.out, options.work
+    make_paper(options.only, units, options.seeds, options.quick, run, out, work)
+
+
 def _envs(options: argparse.Namespace) -> None:
     from rich.console import Console
 
@@ -280,6 +291,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "play": _play,
     "export": _export,
     "enautilus": _enautilus,
+    "paper": _paper,
     "envs": _envs,
 }
 

@@ -108,9 +108,19 @@ class PPOConfig(Section):
 
 
 class EvaluationConfig(Section):
-    """How policies are scored: mean undiscounted return, deterministic actions, fixed starts."""
+    """How policies are scored. The defaults give a number the same meaning in every run; the paper's units do not."""
 
     episodes: Count = Field(64, description="episodes of each evaluation")
+    actions: Literal["deterministic", "sampled"] = Field(
+        "deterministic",
+        description="the mean action from the same starts for every policy, or sampled actions from fresh starts",
+    )
+    units: Literal["raw", "paper"] = Field(
+        "raw", description="mean undiscounted return, or the paper's: discounted, rewards over their running deviation"
+    )
+    scale_discount: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.995, description="paper units: gamma of the sums whose running deviation divides rewards"
+    )
 
 
 class SearchConfig(Section):
@@ -157,7 +167,7 @@ class Config(Section):
     checkpoints: CheckpointConfig = CheckpointConfig()
     steps: Count = Field(2_500_000, description="budget of environment steps used for learning")
     reference_point: tuple[Finite, ...] = Field(
-        (), description="of the reported hypervolume, raw units; empty: a tenth of the range below the warm-up"
+        (), description="of the reported hypervolume; empty: a tenth of the range below the first policies"
     )
 
     @field_validator("env")
@@ -246,7 +256,7 @@ _TUNED_CAR = {
 _PAPER_CHEETAH = {
     "population": {"agents": 6, "warmup_iterations": 40, "iterations": 40},
     "ppo": {"environments": 4, "rollout_steps": 400, "discount": 0.99},
-    "evaluation": {"episodes": 16},
+    "evaluation": {"episodes": 16, "scale_discount": 0.99},
     "steps": 5_000_000,
     "reference_point": (-100.0, -6000.0),
 }

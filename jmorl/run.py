@@ -19,7 +19,7 @@ from jmorl.decision.protocol import Answer, DecisionMaker, Purpose, Question
 from jmorl.decision.users import make_user
 from jmorl.learning.moppo import Learner
 from jmorl.learning.population import Population
-from jmorl.scoring import Scores, raw_scores
+from jmorl.scoring import Scores, paper_scores, raw_scores
 from jmorl.search.archive import Archive
 from jmorl.search.bounds import lower_bounds, within
 from jmorl.search.buffer import PerformanceBuffer
@@ -36,6 +36,7 @@ from jmorl.search.prediction import Records, predict
 from jmorl.search.scaling import Scale, range_scale, search_scale
 from jmorl.search.selection import Task, select_tasks
 from jmorl.search.weights import simplex_grid, spread_weights
+from jmorl.units import RunningUnits, initial_units, measured_in
 
 REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor the middle dominate a gain
 
@@ -48,6 +49,7 @@ class RunState:
     records: Records
     bounds: np.ndarray  # [M] -inf before the first choice
     archive: Archive = Archive()
+    units: RunningUnits | None = None  # of the scores; None for raw ones, which have nothing to remember
     reference_point: np.ndarray | None = None  # [M] of the reported hypervolume; None before the warm-up
     choice: Policy | None = None  # what the decision maker chose last
     silent_generations: int = 0  # still to go before the next question
@@ -104,7 +106,7 @@ class GenerationFinished:
     """A generation (0: the warm-up) is trained, evaluated and in the archive."""
 
     state: RunState
-    offspring: tuple[Policy, ...]
+    offspring: tuple[Policy, ...]  # in paper units generation 0 begins with the untrained agents
     candidates: int  # policies the search could continue; 0 in the warm-up
     steps: int  # environment steps used for learning so far
     seconds: Seconds
@@ -142,21 +144,30 @@ def run(
     decision_maker: DecisionMaker | None = None,
     environment: Environment[Any] | None = None,
     state: RunState | None = None,
+    population: Population | None = None,
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
+    A `population` of the same environment and sections of the config, left by another run, need not be compiled anew.
     Raises TrainingFault in the generation in which a number stops being finite; the events before it stand.
     """
     environment = environment or envs.make(config.env)
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
-    return _Run(config, environment, decision_maker).events(state)
+    return _Run(config, environment, decision_maker, population or Population(environment, config)).events(state)
 
 
-def evaluation_keys(config: Config) -> jax.Array:
-    """The start keys [episodes] from which a run evaluates every policy."""
-    return jax.random.split(_keys(config)[2], config.evaluation.episodes)
+def evaluation_keys(config: Config, evaluated: int = 0) -> jax.Array:
+    """The keys [episodes] from which a run evaluates its policies, all agents from the same.
+
+    For deterministic actions they are the same for every policy of the run; for sampled ones, which are not to be
+    selected for their luck, others in each evaluation: after so many `evaluated` policies.
+    """
+    key = _keys(config)[2]
+    if config.evaluation.actions == "sampled":
+        key = jax.random.fold_in(key, evaluated)
+    return jax.random.split(key, config.evaluation.episodes)
 
 
 def _keys(config: Config) -> jax.Array:
@@ -167,17 +178,19 @@ def _keys(config: Config) -> jax.Array:
 class _Run:
     """What stays the same during a run, and the steps it is made of."""
 
-    def __init__(self, config: Config, environment: Environment[Any], decision_maker: DecisionMaker):
+    def __init__(
+        self, config: Config, environment: Environment[Any], decision_maker: DecisionMaker, population: Population
+    ):
         self.config = config
         self.environment = environment
         self.decision_maker = decision_maker
-        self.population = Population(environment, config)
+        self.population = population
         self.candidate_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
+        self.objectives = measured_in(config.evaluation.units, environment.objectives)
         self.initial_key, self.training_key, _ = _keys(config)
-        self.start_keys = evaluation_keys(config)
 
     def events(self, state: RunState | None) -> Iterator[Event]:
-        yield Compiled(self.population.compile(self.start_keys), len(self.population.devices))
+        yield Compiled(self.population.compile(evaluation_keys(self.config)), len(self.population.devices))
         if state is None:
             finished = self.warm_up()
             yield finished
@@ -207,14 +220,21 @@ class _Run:
     def warm_up(self) -> GenerationFinished:
         """Generation 0: P new agents, with weights evenly spread."""
         objectives = len(self.environment.objectives)
+        in_paper_units = self.config.evaluation.units == "paper"
         state = RunState(
             PerformanceBuffer(self.config.search.buffer_bins, self.config.search.buffer_size),
             Records.empty(objectives),
             bounds=np.full(objectives, -np.inf),
+            units=initial_units(objectives) if in_paper_units else None,
         )
         weights = spread_weights(objectives, self.config.population.agents)
         learners = self.population.initialize(self.initial_key)
-        return self._trained(state, learners, weights, self.config.population.warmup_iterations)
+        # The authors score untrained agents, too: they enter archive and buffer, and set the units.
+        untrained: tuple[Policy, ...] = ()
+        if in_paper_units:
+            state, untrained = self._evaluated(state, learners, weights, None)
+        finished = self._trained(state, learners, weights, self.config.population.warmup_iterations)
+        return replace(finished, offspring=(*untrained, *finished.offspring))
 
     def generation(self, state: RunState) -> GenerationFinished:
         """Select P tasks, train them, and take their offspring in."""
@@ -236,7 +256,7 @@ class _Run:
         """Put a question to the decision maker."""
         previous = state.choice.id if state.choice else None
         generation = state.generation + 1
-        question = Question(purpose, generation, self.environment.objectives, tuple(front), state.bounds, previous)
+        question = Question(purpose, generation, self.objectives, tuple(front), state.bounds, previous)
         started = time.perf_counter()
         answer = self.decision_maker.answer(question)
         seconds = time.perf_counter() - started
@@ -318,17 +338,9 @@ class _Run:
             learners, weights, key, iterations, self.config.learning_rate(state.iterations)
         )
         trained = time.perf_counter()
-        scores = raw_scores(self.population.evaluate(learners, self.start_keys))
+        state, offspring = self._evaluated(state, learners, weights, lineage)
         evaluated = time.perf_counter()
-
-        offspring = _policies(state, learners, weights, scores, lineage)
-        state = self._taken_in(state, offspring, lineage)
-        state = replace(
-            state,
-            iterations=state.iterations + iterations,
-            evaluation_steps=state.evaluation_steps + scores.steps,
-            policies=state.policies + len(offspring),
-        )
+        state = replace(state, iterations=state.iterations + iterations)
         seconds = Seconds(lineage.select_seconds if lineage else 0.0, trained - started, evaluated - trained)
         return GenerationFinished(
             state,
@@ -342,6 +354,20 @@ class _Run:
             utility_metrics(self.decision_maker.utility, state.archive.members, state.buffer.members, state.bounds),
             prediction_metrics(lineage.parents if lineage else (), offspring, range_scale(state.archive.values)),
         )
+
+    def _evaluated(
+        self, state: RunState, learners: Learner, weights: np.ndarray, lineage: Lineage | None
+    ) -> tuple[RunState, tuple[Policy, ...]]:
+        """The state with learners [P], trained with weights [P, M], scored and taken in; and their policies."""
+        returns = self.population.evaluate(learners, evaluation_keys(self.config, state.policies))
+        scores, units = raw_scores(returns), None
+        if state.units:
+            discounts = self.config.ppo.discount, self.config.evaluation.scale_discount
+            scores, units = paper_scores(returns, state.units, *discounts)
+        offspring = _policies(state, learners, weights, scores, lineage)
+        state = self._taken_in(state, offspring, lineage)
+        evaluation_steps, policies = state.evaluation_steps + scores.steps, state.policies + len(offspring)
+        return replace(state, units=units, evaluation_steps=evaluation_steps, policies=policies), offspring
 
     def _taken_in(self, state: RunState, offspring: tuple[Policy, ...], lineage: Lineage | None) -> RunState:
         """The state with the offspring in archive, buffer and records."""
@@ -376,6 +402,7 @@ def _policies(
             # Copied, or each policy would keep those of its whole generation in memory.
             snapshot=jax.tree.map(lambda leaf, index=index: leaf[index].copy(), learners),
             predicted=lineage.predicted[index] if lineage else None,
+            raw=None if scores.raw is None else scores.raw[index],
         )
         for index in range(len(weights))
     )

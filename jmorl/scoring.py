@@ -1,7 +1,7 @@
-"""From episodes to scores: what a policy is worth, in raw units.
+"""From episodes to scores: what a policy is worth, in raw or in the paper's units.
 
-A score is the mean undiscounted return over the evaluation episodes: it means the same in every run and at
-every time of a run.
+A raw score is the mean undiscounted return over the evaluation episodes: it means the same in every run and at
+every time of a run. For the paper's see `jmorl.units`.
 """
 
 from typing import Any, NamedTuple
@@ -14,6 +14,7 @@ import envs
 from envs.mujoco_model import quiet_mujoco
 from jmorl.learning.rollout import EpisodeReturns, episode_returns
 from jmorl.storage.policy_file import StoredPolicy
+from jmorl.units import RunningUnits, in_running_units
 
 
 class NotInGymnasium(ValueError):
@@ -23,10 +24,11 @@ class NotInGymnasium(ValueError):
 class Scores(NamedTuple):
     """The scores of P policies."""
 
-    values: np.ndarray  # [P, M] mean undiscounted return
+    values: np.ndarray  # [P, M] in the units of the scorer
     spread: np.ndarray  # [P, M] standard deviation over the episodes
-    discounted: np.ndarray  # [P, M] mean discounted return
+    discounted: np.ndarray  # [P, M] mean discounted return, raw
     steps: int  # environment steps of all episodes
+    raw: np.ndarray | None = None  # [P, M] mean undiscounted return, where `values` are in other units
 
 
 def raw_scores(returns: EpisodeReturns) -> Scores:
@@ -34,6 +36,26 @@ def raw_scores(returns: EpisodeReturns) -> Scores:
     undiscounted = np.asarray(returns.undiscounted, np.float64)
     discounted = np.asarray(returns.discounted, np.float64)
     return Scores(undiscounted.mean(1), undiscounted.std(1), discounted.mean(1), int(returns.length.sum()))
+
+
+def paper_scores(
+    returns: EpisodeReturns, units: RunningUnits, discount: float, scale_discount: float
+) -> tuple[Scores, RunningUnits]:
+    """Score `EpisodeReturns` [P, episodes, M] with traces as the authors do, and the units after all of them.
+
+    An episode is worth sum_t discount^t r_t, r_t in running units; those are fed agent by agent, episode by episode,
+    as the authors' one evaluation environment is. `scale_discount` is that of the units' own sums.
+    """
+    assert returns.trace is not None, "evaluation in paper units keeps every reward"
+    rewards, terminated, lengths = map(np.asarray, (*returns.trace, returns.length))
+    powers = discount ** np.arange(rewards.shape[2])
+    worth = np.empty(np.shape(returns.undiscounted))  # [P, episodes, M]
+    for each in np.ndindex(*lengths.shape):
+        length = lengths[each]
+        scaled, units = in_running_units(rewards[each][:length], bool(terminated[each]), units, scale_discount)
+        worth[each] = powers[:length] @ scaled
+    raw = raw_scores(returns)
+    return raw._replace(values=worth.mean(1), spread=worth.std(1), raw=raw.values), units
 
 
 def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:

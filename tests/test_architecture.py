@@ -15,19 +15,26 @@ MAY_IMPORT = {
     "jmorl.decision": {"envs", "jmorl.display", "jmorl.search"},
     "jmorl.config": {"envs", "jmorl.decision"},
     "jmorl.signals": set(),
+    "jmorl.units": {"envs"},
     "jmorl.arguments": {"jmorl.config"},
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
-    "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
+    "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage", "jmorl.units"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},
     "jmorl.run": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search")
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),
+        "jmorl.units",
     },
     "jmorl.storage": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search")
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search"),
+        "jmorl.units",
     },
     "jmorl.report": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
         *("jmorl.run", "jmorl.search", "jmorl.storage"),
+    },
+    "jmorl.paper": {
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.run"),
+        *("jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}

@@ -284,10 +284,14 @@ class MOPPO:
             learner.parameters["actor"], normalize(learner.observation_statistics, observation)
         )
 
-    def evaluate(self, learner: Learner, keys: jax.Array) -> EpisodeReturns:
-        """One deterministic episode for each start key [episodes], with the learner's frozen statistics."""
+    def evaluate(
+        self, learner: Learner, keys: jax.Array, sampled: bool = False, traced: bool = False
+    ) -> EpisodeReturns:
+        """One episode for each key [episodes], as `episode_returns`, with the learner's frozen statistics."""
         policy = self.policy(learner)
-        return jax.vmap(lambda key: episode_returns(self.environment, policy, key, self.config.discount))(keys)
+        return jax.vmap(
+            lambda key: episode_returns(self.environment, policy, key, self.config.discount, sampled, traced)
+        )(keys)
 
 
 def _random_order(key: jax.Array, size: int) -> jax.Array:

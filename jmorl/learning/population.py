@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -30,24 +31,29 @@ class Population:
     def __init__(self, environment: Environment[Any], config: Config):
         _check_shapes(environment)
         self.size = config.population.agents
+        self._compiled = False
         self.moppo = MOPPO(environment, config.ppo)
         self.devices = jax.devices()[: device_count(self.size, jax.device_count())]
         mesh = Mesh(np.array(self.devices), (AGENTS,))
         self._initialize = jax.jit(jax.vmap(self.moppo.initial_learner))
         self._train = _sharded(self.moppo.train, mesh)
-        self._evaluate = _sharded(self.moppo.evaluate, mesh)
+        sampled, traced = config.evaluation.actions == "sampled", config.evaluation.units == "paper"
+        self._evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
 
     def compile(self, start_keys: jax.Array) -> float:
         """Compile both calls, for evaluation from as many start keys [episodes]. Returns the seconds it took.
 
-        What is called afterwards are these programs: nothing is traced or compiled again.
+        What is called afterwards are these programs: nothing is traced or compiled again, not by this method either.
         """
+        if self._compiled:
+            return 0.0
         started = time.perf_counter()
         keys = jax.random.split(start_keys[0], self.size)
         learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys)
         weights = np.zeros((self.size, len(self.moppo.environment.objectives)), np.float32)
         self._train = self._train.lower(learners, weights, keys, _schedule(0, 0.0)).compile()
         self._evaluate = self._evaluate.lower(learners, start_keys).compile()
+        self._compiled = True
         return time.perf_counter() - started
 
     def initialize(self, key: jax.Array) -> Learner:
@@ -71,7 +77,7 @@ class Population:
         return learners, diagnostics
 
     def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        """Returns [P, episodes, M] of every learner from the same start keys [episodes].
+        """Returns [P, episodes, M] of every learner from the same keys [episodes], with traces for paper units.
 
         Raises TrainingFault, naming the agents, if a return is not finite.
         """

@@ -73,40 +73,62 @@ def correlated_noise(key: jax.Array, shape: tuple[int, int], correlation: float)
     return jnp.concatenate([white[:1], jax.lax.scan(step, white[0], white[1:])[1]])
 
 
+class Trace(NamedTuple):
+    """The rewards of one episode, for scores that are no plain sum of them."""
+
+    rewards: jax.Array  # [T, M] raw; zero from the episode's length on
+    terminated: jax.Array  # [] bool: ended by itself, not by the time limit
+
+
 class EpisodeReturns(NamedTuple):
     """The vector returns of one episode."""
 
     undiscounted: jax.Array  # [M]
     discounted: jax.Array  # [M]
     length: jax.Array  # [] int32 steps
+    trace: Trace | None = None  # only if it was asked for
 
 
 def episode_returns(
-    environment: Environment[Any], policy: PolicyFunction, key: jax.Array, discount: float
+    environment: Environment[Any],
+    policy: PolicyFunction,
+    key: jax.Array,
+    discount: float,
+    sampled: bool = False,
+    traced: bool = False,
 ) -> EpisodeReturns:
-    """One episode from `key`'s start, with deterministic actions (the mean), to its end or the time limit.
+    """One episode, its start drawn from `key`, to its end or the time limit.
 
-    The scan always runs to the time limit; what comes after the end is masked.
+    Actions are the mean, or, if `sampled`, drawn from the policy. `traced`: every reward is kept. The scan always
+    runs to the time limit; what comes after the end is masked.
     """
+    start_key, noise = key, None
+    if sampled:
+        start_key, noise_key = jax.random.split(key)
+        noise = jax.random.normal(noise_key, (environment.time_limit, environment.action_size))
 
     def act(
-        carry: tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], _: None
-    ) -> tuple[tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], None]:
+        carry: tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], noise_t: jax.Array | None
+    ) -> tuple[tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], tuple[jax.Array, jax.Array] | None]:
         state, observation, running, returns = carry
-        mean, _log_std = policy(observation)
-        state, step = environment.advance(state, mean)
+        mean, log_std = policy(observation)
+        state, step = environment.advance(state, mean if noise_t is None else mean + jnp.exp(log_std) * noise_t)
         # A weight of zero would let a NaN from beyond the end through; a where does not.
         reward = jnp.where(running, step.reward, 0.0)
+        kept = (reward, running & step.terminated) if traced else None
         returns = EpisodeReturns(
             returns.undiscounted + reward,
             returns.discounted + discount**returns.length * reward,
             returns.length + running,
         )
         running = running & ~(step.terminated | step.truncated)
-        return (state, step.observation, running, returns), None
+        return (state, step.observation, running, returns), kept
 
-    state, observation = environment.reset(key)
+    state, observation = environment.reset(start_key)
     zeros = jnp.zeros(len(environment.objectives))
     start = (state, observation, jnp.array(True), EpisodeReturns(zeros, zeros, jnp.array(0)))
-    (_, _, _, returns), _ = jax.lax.scan(act, start, None, length=environment.time_limit)
-    return returns
+    (_, _, _, returns), kept = jax.lax.scan(act, start, noise, length=environment.time_limit)
+    if kept is None:
+        return returns
+    rewards, terminated = kept
+    return returns._replace(trace=Trace(rewards, terminated.any()))

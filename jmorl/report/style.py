@@ -26,6 +26,7 @@ INK, GREY, PALE = "#222222", "#767676", "#b8b8b8"
 SETTINGS: dict[Any, Any] = {
     "figure.dpi": DOTS_PER_INCH,
     "savefig.dpi": DOTS_PER_INCH,
+    "svg.hashsalt": "jmorl",  # the same figure gives the same file
     "figure.facecolor": "white",
     "font.family": "DejaVu Sans",
     "font.size": 10,

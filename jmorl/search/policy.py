@@ -24,6 +24,7 @@ class Policy:
     discounted: np.ndarray  # [M] mean discounted return
     snapshot: Any = field(repr=False)  # parameters, optimiser state and statistics
     predicted: np.ndarray | None = None  # [M] the values the search expected; None in the warm-up
+    raw: np.ndarray | None = None  # [M] mean undiscounted return, where `values` are in other units; else None
 
 
 def values_of(policies: Sequence[Policy]) -> np.ndarray:  # [N, M]

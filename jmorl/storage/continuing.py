@@ -12,6 +12,7 @@ from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
+from jmorl.learning.population import Population
 from jmorl.run import Event, RunState, run
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import (
@@ -47,15 +48,19 @@ class Continued:
     notes: tuple[str, ...] = ()  # what somebody should know about it, sentences
 
     def events(
-        self, user: DecisionMaker | None = None, asking: Callable[[], AbstractContextManager[object]] = nullcontext
+        self,
+        user: DecisionMaker | None = None,
+        asking: Callable[[], AbstractContextManager[object]] = nullcontext,
+        population: Population | None = None,
     ) -> Iterator[Event]:
         """Run on, recording every event before it is passed on; answers that the log has are not asked for again.
 
-        `user` defaults to that of the config, and is asked within `asking()`.
+        `user` defaults to that of the config, and is asked within `asking()`; `population` is as in `run`.
         """
         config, environment = self.folder.config, self.folder.environment
         user = user or make_user(config.user, environment.objectives)
-        for event in run(config, Remembered(user, self.folder.decisions.ahead, asking), environment, self.state):
+        remembered = Remembered(user, self.folder.decisions.ahead, asking)
+        for event in run(config, remembered, environment, self.state, population):
             self.folder.record(event)
             yield event
 

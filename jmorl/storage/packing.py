@@ -21,6 +21,7 @@ from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
+from jmorl.units import RunningUnits
 
 COUNTERS = tuple(field.name for field in fields(RunState) if field.type is int)
 VECTORS = ("weights", "values", "spread", "discounted")  # of a policy, [M]
@@ -61,6 +62,7 @@ def pack(state: RunState) -> PackedState:
         "predicted": np.stack([nothing if p.predicted is None else p.predicted for p in policies]),
         "bounds": state.bounds,
         "reference_point": state.reference_point,
+        **_packed_units(state.units, policies),
         **_packed_records(state.records),
         **_packed([policy.snapshot for policy in policies]),
     }
@@ -86,6 +88,7 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
             **{name: arrays[name][row].copy() for name in VECTORS},
             snapshot=snapshots[row],
             predicted=arrays["predicted"][row].copy() if origin["predicted"] else None,
+            raw=arrays["raw"][row].copy() if "raw" in arrays else None,
         )
         for row, origin in enumerate(document["policies"])
     }
@@ -96,6 +99,7 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
         records=_unpacked_records(arrays),
         bounds=arrays["bounds"],
         archive=Archive(tuple(policies[each] for each in document["archive"])),
+        units=RunningUnits(*arrays["units"]) if "units" in arrays else None,
         reference_point=arrays["reference_point"],
         choice=None if choice is None else policies[choice],
         **document["counters"],
@@ -104,6 +108,14 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
 
 def _mentioned(state: RunState) -> tuple[Policy, ...]:
     return (*state.archive.members, *state.buffer.members, *([state.choice] if state.choice else []))
+
+
+def _packed_units(units: RunningUnits | None, policies: Sequence[Policy]) -> dict[str, np.ndarray]:
+    """Nothing in raw units, where policies have no raw values beside their scores."""
+    if units is None:
+        return {}
+    raw = [policy.raw for policy in policies if policy.raw is not None]  # all of them
+    return {"units": np.stack(list(vars(units).values())), "raw": np.stack(raw)}
 
 
 def _packed_records(records: Records) -> dict[str, np.ndarray]:

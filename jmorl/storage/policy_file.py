@@ -1,8 +1,8 @@
 """A policy as one file: a NumPy archive with a JSON header, read without pickle and without JAX.
 
-The header names the environment, objectives with their units, scores and their spread, weights and origin, and says
-how the network is computed; the arrays are the actor's layers and the observation statistics.
-`load_policy(path)(observation)` is the deterministic action.
+The header names the environment, objectives with their units, mean undiscounted returns, the score the run went by and
+its spread, weights and origin, and says how the network is computed; the arrays are the actor's layers and the
+observation statistics. `load_policy(path)(observation)` is the deterministic action.
 """
 
 import importlib.metadata
@@ -75,7 +75,8 @@ def save_policy(
         "generation": policy.generation,
         "parent": policy.parent,
         "weights": policy.weights.tolist(),
-        "values": policy.values.tolist(),
+        "values": (policy.values if policy.raw is None else policy.raw).tolist(),
+        "score": policy.values.tolist(),  # other than the values only in paper units
         "spread": policy.spread.tolist(),
         "discounted": policy.discounted.tolist(),
         "evaluation_episodes": config.evaluation.episodes,

@@ -2,8 +2,9 @@
 
 config.toml      every setting, as resolved; `jmorl train --config` takes it
 manifest.json    versions, device, commit, command; the run that it branches off; where it was resumed
-metrics.csv      one row for each generation; 0 is the warm-up
-policies.csv     one row for each evaluated policy: origin, weights, scores, what was predicted
+metrics.csv      one row for each generation; 0 is the warm-up; `sigma` only in paper units
+policies.csv     one row for each evaluated policy: origin, weights, scores, what was predicted; `raw` returns only
+                 where the scores are in paper units
 front.csv        the rows of the current front
 decisions.jsonl  every question and answer; `--user script=FILE` replays it
 policies/ID.npz  each policy that entered the archive
@@ -161,6 +162,7 @@ class RunFolder:
             "policies_shown": state.policies_shown,
             "candidates": event.candidates,
             **self._named("bound", state.bounds),
+            **self._named("sigma", state.units.deviation if state.units else np.full_like(state.bounds, np.nan)),
             **event.training,
             **asdict(event.front),
             **asdict(event.utility),
@@ -168,7 +170,7 @@ class RunFolder:
         }
 
     def _policy_row(self, policy: Policy) -> Row:
-        predicted = np.full_like(policy.values, np.nan) if policy.predicted is None else policy.predicted
+        nothing = np.full_like(policy.values, np.nan)
         return {
             "policy": policy.id,
             "generation": policy.generation,
@@ -177,7 +179,8 @@ class RunFolder:
             **self._named("value", policy.values),
             **self._named("spread", policy.spread),
             **self._named("discounted", policy.discounted),
-            **self._named("predicted", predicted),
+            **self._named("predicted", nothing if policy.predicted is None else policy.predicted),
+            **self._named("raw", nothing if policy.raw is None else policy.raw),
         }
 
     def _named(self, prefix: str, vector: np.ndarray) -> dict[str, float | None]:

@@ -16,6 +16,7 @@ from jmorl.decision.records import Record, ScriptError, read_log
 from jmorl.search.policy import Policy
 from jmorl.storage.manifest import read_manifest
 from jmorl.storage.versions import NewerFormat
+from jmorl.units import measured_in
 
 
 class StoredRunError(ValueError):
@@ -55,7 +56,7 @@ def read_run(path: Path) -> StoredRun:
     try:
         manifest = read_manifest(path)
         config = resolve(file=path / "config.toml")
-        objectives = envs.make(config.env).objectives
+        objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
         policies = tuple(_policy(row, objectives) for row in _rows(path / "policies.csv"))
         result = path / "result.json"
         log = path / "decisions.jsonl"
@@ -95,6 +96,9 @@ def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy
     def vector(prefix: str) -> np.ndarray:
         return np.array([_number(row[f"{prefix}_{objective.name}"]) for objective in objectives])
 
+    def vector_or_none(prefix: str) -> np.ndarray | None:
+        return None if np.isnan(vector(prefix)).any() else vector(prefix)
+
     return Policy(
         id=int(row["policy"]),
         generation=int(row["generation"]),
@@ -104,5 +108,6 @@ def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy
         spread=vector("spread"),
         discounted=vector("discounted"),
         snapshot=None,
-        predicted=None if np.isnan(vector("predicted")).any() else vector("predicted"),
+        predicted=vector_or_none("predicted"),
+        raw=vector_or_none("raw"),
     )

@@ -11,6 +11,7 @@ from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
+from jmorl.units import RunningUnits
 
 
 @pytest.fixture(scope="package")
@@ -37,6 +38,7 @@ def make_policy(small_config, environment):
             parent=None if warm_up else number - 4,
             snapshot=jax.tree.map(draw, shape),
             predicted=None if warm_up else generator.normal(size=3),
+            raw=generator.normal(size=3),
             **vectors,
         )
 
@@ -56,6 +58,7 @@ def make_state(make_policy, small_config):
             records=Records(*generator.normal(size=(3, 4 * generation, 3))),
             bounds=generator.normal(size=3) if generation else np.full(3, -np.inf),
             archive=Archive((policies[3], policies[0], policies[-1])),
+            units=RunningUnits(*generator.normal(size=(4, 3))),
             reference_point=generator.normal(size=3),
             choice=policies[2] if generation else None,
             silent_generations=generation,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jmorl.run import RunState
+from jmorl.search.archive import Archive
 from jmorl.storage.packing import PackingError, pack, unpack
 
 
@@ -38,6 +39,25 @@ def assert_same(one, other):
 def test_every_field_comes_back_bit_for_bit(make_state, small_config, environment, generation):
     state = make_state(generation)
     assert_same(state, unpack(pack(state), small_config, environment))
+
+
+def test_a_state_in_raw_units_comes_back_too(make_state, small_config, environment):
+    """The made-up states are in paper units, which have more to remember."""
+    state = make_state(2)
+
+    def raw(policies):
+        return tuple(dataclasses.replace(policy, raw=None) for policy in policies)
+
+    state = dataclasses.replace(
+        state,
+        units=None,
+        buffer=dataclasses.replace(state.buffer, members=raw(state.buffer.members)),
+        archive=Archive(raw(state.archive.members)),
+        choice=raw([state.choice])[0],
+    )
+    packed = pack(state)
+    assert_same(state, unpack(packed, small_config, environment))
+    assert not {"raw", "units"} & set(packed.arrays)
 
 
 def test_the_comparison_of_these_tests_sees_every_field(make_state):

@@ -42,7 +42,8 @@ def test_the_header_says_what_the_policy_is(saved, environment, small_config):
     header = load_policy(folder / "chosen.npz").header
     assert header["environment"] == small_config.env
     assert header["objectives"] == [vars(objective) for objective in environment.objectives]
-    assert (header["values"], header["spread"]) == (policy.values.tolist(), policy.spread.tolist())
+    assert header["values"] == policy.raw.tolist()
+    assert (header["score"], header["spread"]) == (policy.values.tolist(), policy.spread.tolist())
     assert header["weights"] == policy.weights.tolist()
     assert header["network"]["sizes"] == [2, 64, 64, 2] and header["network"]["activation"] == "tanh"
     assert header["run"] == {"id": "run-id", "config": small_config.digest(), "method": "interactive", "seed": 1}

@@ -1,0 +1,97 @@
+"""`jmorl paper`: the runs that are missing, one after the other, then the report."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from jmorl.display.text import duration, short_count
+from jmorl.learning.population import TrainingFault
+from jmorl.paper.plan import ITEMS, NAMES, Cell, Plan, distinct, in_order
+from jmorl.paper.report import Scope, write_report
+from jmorl.paper.runner import Places, known, make, missing
+from jmorl.paper.targets import propose
+from jmorl.run import Event, GenerationFinished, RunFinished
+from jmorl.signals import StopSignals
+
+
+def make_paper(
+    only: Sequence[str] | None,
+    units: Sequence[str],
+    seeds: Sequence[int] | None,
+    quick: bool,
+    run: bool,
+    out: Path | None = None,
+    work: Path | None = None,
+) -> None:
+    """Make what is missing of the items named, all by default, and write the report; without `run` only that.
+
+    `only` may have "targets": runs on other seeds, from which targets for HalfCheetah are proposed.
+    """
+    console = Console()
+    plan = Plan(quick, tuple(seeds) if seeds else None)
+    out = out or Path("runs/paper-quick" if quick else "benchmarks/paper")
+    places = Places(out / "records", work or (out / "work" if quick else Path("runs/paper")))
+    items = [item for item in ITEMS.values() if only is None or item.name in only]
+    parts = [_Part(item.name, each, plan.cells(item, each)) for item, each in in_order(items, units)]
+    if only and "targets" in only:
+        parts += [_Part(f"targets, {NAMES[env]}", "raw", plan.pilots(env)) for env in NAMES]
+    if run:
+        _make_all(parts, places, console)
+    if only and "targets" in only:
+        for env in NAMES:
+            console.print(propose(env, known(plan.pilots(env), places)), soft_wrap=True, highlight=False)
+    if items:
+        cells = distinct(cell for part in parts for cell in part.cells)
+        path = write_report(out, Scope(plan, items, units), known(cells, places))
+        console.print(f"report: {path}", soft_wrap=True, highlight=False)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """An item in one kind of units."""
+
+    name: str
+    units: str
+    cells: Sequence[Cell]
+
+
+def _make_all(parts: Sequence[_Part], places: Places, console: Console) -> None:
+    """Every part's missing runs. What two parts share is made with the first."""
+    with StopSignals("stopping after this generation; the same command goes on from there") as stop:
+        for part in parts:
+            name = f"{part.name}, {part.units} units"
+            todo = missing(part.cells, places)
+            started, steps = time.monotonic(), 0
+            for number, cell in enumerate(todo, start=1):
+                try:
+                    steps += _make_one(cell, places, f"{name}, {number} of {len(todo)}", console, stop)
+                except TrainingFault as fault:  # it would break down again; the others need not wait for it
+                    _say(console, f"  {name}: {cell.key} broke down: {fault}")
+            spent = duration(time.monotonic() - started)
+            _say(console, f"{name}: {len(todo)} runs, {short_count(steps)} steps, {spent}" if todo else f"{name}: done")
+
+
+def _make_one(cell: Cell, places: Places, name: str, console: Console, stop: StopSignals) -> int:
+    """Make a run, with a line that changes on a terminal, and one that stays. Returns its steps."""
+    started = time.monotonic()
+    with console.status(f"{name}: {cell.key}") as status:
+
+        def watch(_: Cell, event: Event) -> None:
+            if isinstance(event, GenerationFinished):
+                rate = short_count(event.steps_per_second)
+                status.update(f"{name}: {cell.key}, {short_count(event.steps)} steps, {rate} steps/s")
+            if not isinstance(event, RunFinished):
+                stop.check()
+
+        record = make(cell, places, watch)
+    spent = duration(time.monotonic() - started)
+    _say(console, f"  {name}: {cell.key}, {short_count(record.steps[-1])} steps, {spent}")
+    stop.check()
+    return int(record.steps[-1])
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(text, soft_wrap=True, highlight=False)

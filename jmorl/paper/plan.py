@@ -1,0 +1,190 @@
+"""Which runs the paper's tables and figures are made of, and with which settings.
+
+A cell is one training run. What two items need alike is one cell: PGMORL asks nobody before its end, so its run for a
+seed serves every user and target.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from jmorl.config import Config, resolve
+from jmorl.decision.utility import USERS
+from jmorl.paper.data import Targets, honest, published
+
+CAR, CHEETAH = "mo-mountaincarcontinuous-v0", "mo-halfcheetah-v5"
+NAMES = {CAR: "mountaincar", CHEETAH: "halfcheetah"}
+METHODS = ("interactive", "pgmorl")
+UNITS = ("raw", "paper")
+TARGET_SEEDS = (1, 7, 10, 42, 100)
+USER_SEEDS = (1, 42, 100)
+PILOT_SEEDS = (2, 3, 5)  # other than all of the above: targets are chosen on them
+USER_STEPS = {CAR: 2_500_000, CHEETAH: 5_000_000}
+
+# What the authors' program does and jmorl's defaults do otherwise, where it is a setting.
+AUTHORS: Mapping[str, Any] = {
+    "evaluation": {"units": "paper", "actions": "sampled", "episodes": 5},
+    "ppo": {"discount": 0.995},
+    "search": {"bounds_scale": "one", "gain_within": "front", "value_scale": "none"},
+}
+REFERENCE = {CAR: (-110.0, -110.0), CHEETAH: (-100.0, -100.0)}  # in paper units
+
+# Sizes of `--quick`: everything happens, nothing is learned.
+QUICK: Mapping[str, Any] = {
+    "population": {"agents": 3, "warmup_iterations": 1, "iterations": 1},
+    "ppo": {"environments": 2, "rollout_steps": 64, "minibatches": 2, "epochs": 1, "hidden_sizes": (8,)},
+    "evaluation": {"episodes": 2},
+}
+QUICK_SEEDS = (1, 7)
+QUICK_STEPS = {"users": 3 * 2 * 64 * 3, "targets": 3 * 2 * 64 * 4}
+QUICK_TARGETS = {"A": (-1e5, -1e5), "B": (-1e3, -350.0), "C": (0.0, 0.0)}  # reached at once, perhaps, and never
+
+Kind = Literal["steps to targets", "greatest utility", "mean utility", "final policies"]
+
+
+@dataclass(frozen=True)
+class Item:
+    """A table or figure of the paper."""
+
+    name: str
+    env: str
+    kind: Kind
+    normalised: bool = False
+
+
+ITEMS = {
+    item.name: item
+    for item in (
+        Item("table1", CAR, "steps to targets"),
+        Item("fig5", CAR, "greatest utility"),
+        Item("fig6", CAR, "mean utility"),
+        Item("fig9", CAR, "final policies"),
+        Item("fig10", CAR, "final policies", normalised=True),
+        Item("table2", CHEETAH, "steps to targets"),
+        Item("fig7", CHEETAH, "greatest utility"),
+        Item("fig8", CHEETAH, "mean utility"),
+        Item("fig11", CHEETAH, "final policies"),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One training run. Its key names its file, and no two cells of a plan have the same."""
+
+    key: str
+    config: Config
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How the experiment is made: at full size, or `quick`; with which seeds, if not the paper's."""
+
+    quick: bool = False
+    seeds: tuple[int, ...] | None = None
+
+    def seeds_of(self, item: Item) -> tuple[int, ...]:
+        if self.quick and not self.seeds:
+            return QUICK_SEEDS
+        return self.seeds or (TARGET_SEEDS if item.kind == "steps to targets" else USER_SEEDS)
+
+    def targets(self, env: str, units: str) -> Targets | None:
+        """Published in paper units; in raw ones what was fixed beforehand, None if nothing was yet."""
+        if units == "paper":
+            return next(table.targets for table in published().tables.values() if table.env == env)
+        return QUICK_TARGETS if self.quick else honest(env).targets
+
+    def user_weights(self, item: Item, units: str) -> dict[str, tuple[float, ...]]:
+        """Each user's weights of the objectives. Normalised utilities are linear, too, with other weights.
+
+        In paper units normalising divides all objectives by the same constant, which changes no decision.
+        """
+        span = honest(item.env).span if item.normalised and units == "raw" else None
+        return {user: weights if span is None else _normalised(weights, span) for user, weights in USERS.items()}
+
+    def cells(self, item: Item, units: str) -> list[Cell]:
+        """The runs that an item needs; none while its targets are not fixed."""
+        if item.kind == "steps to targets" and self.targets(item.env, units) is None:
+            return []
+        goals = self._goals(item, units)
+        seeds = self.seeds_of(item)
+        cells = [self.interactive(item, units, goal, seed) for goal in goals for seed in seeds]
+        return cells + [self.pgmorl(item, units, seed) for seed in seeds]
+
+    def interactive(self, item: Item, units: str, goal: str, seed: int) -> Cell:
+        """The run for a user, or for a target."""
+        to_target = item.kind == "steps to targets"
+        user = self._goals(item, units)[goal]
+        name = "target" if to_target else "user" if user == goal else "normalised"
+        return self._cell(item.env, units, "interactive", user, f"{name}-{goal}", seed, to_target)
+
+    def pgmorl(self, item: Item, units: str, seed: int) -> Cell:
+        """The run for all users and targets.
+
+        With a constant learning rate a run is the beginning of a longer one, so that the longest serves for all; a
+        rate that falls over the budget makes them different runs.
+        """
+        longest = self._cell(item.env, units, "pgmorl", "A", "to-cap", seed, to_cap=True)
+        ppo = longest.config.ppo
+        if item.kind == "steps to targets" or ppo.learning_rate == ppo.final_learning_rate:
+            return longest
+        return self._cell(item.env, units, "pgmorl", "A", "to-budget", seed, to_cap=False)
+
+    def steps(self, item: Item) -> int:
+        """The budget after which an item looks at a run."""
+        return self._steps(item.env, item.kind == "steps to targets")
+
+    def pilots(self, env: str) -> list[Cell]:
+        """Runs of both methods on other seeds, in raw units, on which targets are chosen."""
+        item = next(item for item in ITEMS.values() if item.env == env and item.kind == "greatest utility")
+        seeds = self.seeds or (QUICK_SEEDS if self.quick else PILOT_SEEDS)
+        return [self.interactive(item, "raw", goal, seed) for goal in USERS for seed in seeds] + [
+            self.pgmorl(item, "raw", seed) for seed in seeds
+        ]
+
+    def _goals(self, item: Item, units: str) -> dict[str, str]:
+        """Name -> decision maker, as a config has it."""
+        if item.kind == "steps to targets":
+            unscaled = ",unscaled" if units == "paper" else ""
+            targets = self.targets(item.env, units) or {}
+            return {name: f"target={_listed(target)}{unscaled}" for name, target in targets.items()}
+        weights = self.user_weights(item, units)
+        return {user: user if weights[user] == USERS[user] else f"weights={_listed(weights[user])}" for user in USERS}
+
+    def _steps(self, env: str, to_cap: bool) -> int:
+        if self.quick:
+            return QUICK_STEPS["targets" if to_cap else "users"]
+        cap = next(table.cap_steps for table in published().tables.values() if table.env == env)
+        return cap if to_cap else USER_STEPS[env]
+
+    def _cell(self, env: str, units: str, method: str, user: str, goal: str, seed: int, to_cap: bool) -> Cell:
+        chosen = {"env": env, "method": method, "user": user, "seed": seed, "checkpoints": {"keep": 2}}
+        config = resolve("paper" if units == "paper" else "default", None, chosen)
+        if units == "paper":
+            config = config.replace(**AUTHORS, reference_point=REFERENCE[env])
+        if self.quick:
+            config = config.replace(**QUICK)
+        key = f"{NAMES[env]}-{units}-{method}-{goal}-seed-{seed}"
+        return Cell(key, config.replace(steps=self._steps(env, to_cap)))
+
+
+def distinct(cells: Iterable[Cell]) -> list[Cell]:
+    """Each cell once, in order."""
+    return list({cell.key: cell for cell in cells}.values())
+
+
+def in_order(items: Sequence[Item], units: Sequence[str]) -> Iterator[tuple[Item, str]]:
+    """Raw units first, and of them the car, which is quickest; then the rest."""
+    for unit in units:
+        for item in items:
+            yield item, unit
+
+
+def _normalised(weights: Sequence[float], span: Sequence[float]) -> tuple[float, ...]:
+    """The weights of w . (z / span), summing to one."""
+    divided = [weight / each for weight, each in zip(weights, span, strict=True)]
+    return tuple(round(each / sum(divided), 6) for each in divided)
+
+
+def _listed(numbers: Sequence[float]) -> str:
+    return ",".join(f"{number:g}" for number in numbers)

@@ -1,0 +1,82 @@
+"""Few runs, some of which time out: what can be said of them.
+
+Letters: S runs, one a seed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+CONFIDENCE = 0.95
+RESAMPLES = 9999
+FEWEST = 3  # values whose interval says anything
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean and its bootstrap interval."""
+
+    mean: float
+    low: float
+    high: float
+    count: int  # values
+
+    @property
+    def excludes_zero(self) -> bool:
+        """Whether the sign of the mean is clear; it never is from one value or two."""
+        return self.count >= FEWEST and (self.low > 0 or self.high < 0)
+
+
+def interval(values: Sequence[float]) -> Interval:
+    """The mean of values [S], S >= 1, with its percentile bootstrap interval; one value, or equal ones, have no width.
+
+    The percentile method, not BCa: with five values, several of them equal, the latter is often undefined.
+    """
+    from scipy.stats import bootstrap  # slow to import
+
+    sample = np.asarray(values, float)
+    mean = float(sample.mean())
+    if len(sample) < 2 or np.ptp(sample) == 0:
+        return Interval(mean, mean, mean, len(sample))
+    found = bootstrap(
+        (sample,),
+        np.mean,
+        confidence_level=CONFIDENCE,
+        n_resamples=RESAMPLES,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return Interval(mean, float(found.low), float(found.high), len(sample))
+
+
+@dataclass(frozen=True)
+class Times:
+    """Steps until a target was reached, of runs with one budget. A run that did not reach it is censored there."""
+
+    reached: tuple[float | None, ...]  # [S] None: never
+    budget: float
+
+    @property
+    def successes(self) -> int:
+        return sum(steps is not None for steps in self.reached)
+
+    @property
+    def restricted(self) -> tuple[float, ...]:  # [S]
+        """Steps used, at most the budget."""
+        return tuple(self.budget if steps is None else steps for steps in self.reached)
+
+    @property
+    def restricted_mean(self) -> Interval:
+        """Mean steps used within the budget.
+
+        With all censoring at the budget this is the area under the Kaplan-Meier curve up to there. It is a lower
+        bound for the mean time to the target, not an estimate of it, unless all runs succeed.
+        """
+        return interval(self.restricted)
+
+
+def saved(one: Times, other: Times) -> Interval:
+    """How many steps within the budget `one` needs less than `other`, seed by seed, both in the same order."""
+    pairs = zip(one.restricted, other.restricted, strict=True)
+    return interval([theirs - ours for ours, theirs in pairs])

@@ -1,0 +1,118 @@
+"""From records to results: by hand on made-up ones, and against real runs that stop or have other budgets."""
+
+import numpy as np
+import pytest
+
+from jmorl.paper.analysis import (
+    drift_of,
+    finals,
+    generations_within,
+    greatest_utility,
+    mean_utility,
+    mechanism,
+    non_dominated_or_equal,
+    pooled_front,
+    questions_asked,
+    reached,
+    seconds_between_questions,
+    steps_within,
+)
+from jmorl.paper.record import record_of
+from jmorl.storage.stored_run import read_run
+from tests.paper.made import ITERATION, record
+from tests.resuming import train
+
+
+def test_a_target_is_reached_by_one_policy_in_every_objective():
+    run = record([[(-90, -50)], [(-70, -60), (-95, -40)], [(-80, -45), (-75, -48)]])
+    hit = reached(run, (-80, -50))
+    assert (hit.generation, hit.steps, hit.seconds) == (2, 30 * ITERATION, 12.0)
+    assert hit.policy == 4  # clears by (5, 2), where the other clears by (0, 5)
+    assert reached(run, (-69, -45)) is None
+    assert reached(run, (-90, -50)).generation == 0
+
+
+def test_whether_units_made_a_success():
+    run = record([[(-1.5, -1.5)], [(-0.9, -0.9)]], sigma=[(40, 20), (80, 20)])
+    np.testing.assert_array_equal(drift_of(run, 1), [2, 1])
+    assert not reached(run, (-1, -1)).without_drift  # (-1.8, -0.9) in the first units
+    assert reached(run, (-1.9, -1)).without_drift
+    assert reached(record([[(-1.0, -1.0)]]), (-1, -1)).without_drift
+
+
+def test_utilities_are_of_archive_and_buffer():
+    run = record([[(-90, -50), (-95, -55)], [(-70, -60)]])
+    steps = 20 * ITERATION
+    np.testing.assert_allclose(greatest_utility(run, (0.5, 0.5), steps), [-70, -65])
+    np.testing.assert_allclose(mean_utility(run, (0.5, 0.5), steps), [-72.5, (-70 - 75 - 65) / 3])
+
+
+def test_final_policies_are_filtered_together():
+    pgmorl = [record([[(-100, -20), (-70, -60)]]), record([[(-85, -40), (-99, -21)]])]
+    ours = [record([[(-84, -39)]]), record([[(-71, -61)]])]
+    found = finals(ours, pgmorl, (0.5, 0.5), 10 * ITERATION)
+    assert found.pooled.tolist() == [[-100, -20], [-70, -60], [-85, -40], [-99, -21]]
+    assert found.enautilus.tolist() in found.pooled.tolist()
+    np.testing.assert_array_equal(found.interactive, [(-84, -39), (-71, -61)])
+    assert found.kept[0]
+    if found.enautilus.tolist() == [-85, -40]:
+        assert not found.enautilus_kept
+
+
+def test_equal_policies_do_not_dominate_each_other():
+    values = np.array([[1.0, 2], [1, 2], [0, 2], [2, 1]])
+    assert non_dominated_or_equal(values).tolist() == [True, True, False, True]
+
+
+def test_the_mechanism_counts_repeats_and_gains():
+    run = record(
+        [[(0.0, 0.0), (10.0, -10.0)], [(5.0, 0.0)]],
+        parents={2: (0, (2.0, 2.0))},
+        questions=[(1, 0), (2, 0), (3, 2)],
+        candidates=1,
+    )
+    found = mechanism([run])
+    assert (found.candidates, found.alone, found.repeated) == (1, 1.0, 0.5)
+    front = np.array([[10.0, -10.0], [5.0, 0.0]])
+    span = np.ptp(front, axis=0)
+    assert found.predicted_gain == pytest.approx(np.mean(2 / span))
+    assert found.realised_gain == pytest.approx(np.mean([5, 0] / span))
+    assert questions_asked([run]) == 3 and seconds_between_questions([run]) == 4.0
+
+
+@pytest.fixture(scope="module")
+def pgmorl(compiled_once, small_config, tmp_path_factory):
+    """A function of a config, that makes a PGMORL run of three objectives with it."""
+    folder = tmp_path_factory.mktemp("runs")
+
+    def make(name, **changes):
+        return record_of(read_run(train(folder / name, small_config.replace(method="pgmorl", **changes))))
+
+    return make
+
+
+def test_the_long_run_says_when_a_run_that_stops_would_have_stopped(pgmorl):
+    whole = pgmorl("whole")
+    fronts = [whole.values[list(generation.front)] for generation in whole.generations]
+    for generation in (1, 2, 3):
+        new = [row for row in fronts[generation].tolist() if row not in fronts[generation - 1].tolist()]
+        target = np.array(new[0]) - 1e-4
+        hit = reached(whole, target)
+        listed = ",".join(f"{value:.7g}" for value in target)
+        stopped = pgmorl(f"stops-{generation}", user=f"target={listed}")
+        assert hit.generation == generation
+        assert (stopped.reason, stopped.steps[-1]) == ("satisfied", hit.steps)
+        assert stopped.generations[-1].front == whole.generations[generation].front
+
+
+def test_with_a_constant_learning_rate_a_run_is_the_beginning_of_a_longer_one(pgmorl, small_config):
+    whole = pgmorl("longer")
+    assert steps_within(small_config, small_config.steps) == whole.steps[-1]
+    for iterations in (3, 5, 6, 8):
+        steps = 4 * 3 * 16 * iterations
+        short = pgmorl(f"short-{iterations}", steps=steps)
+        count = generations_within(whole, steps)
+        assert steps_within(small_config, steps) == short.steps[-1]
+        assert [each.front for each in whole.generations[:count]] == [each.front for each in short.generations]
+        np.testing.assert_array_equal(whole.values[: len(short.values)], short.values)
+        np.testing.assert_array_equal(pooled_front([whole], steps), pooled_front([short], steps))

@@ -1,0 +1,141 @@
+"""`jmorl paper --quick` from beginning to end: runs, records, report and figures; interrupted, resumed and repeated."""
+
+import re
+import struct
+
+import pytest
+
+from jmorl.cli import main
+from jmorl.learning.population import TrainingFault
+from jmorl.paper.plan import ITEMS, Plan
+from jmorl.paper.record import read_record
+from jmorl.paper.runner import Places, make, missing
+from jmorl.run import GenerationFinished
+
+CAR_ITEMS = "table1,fig5,fig6,fig9,fig10"
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """The car's part, both units, three users and targets, two seeds."""
+    folder = tmp_path_factory.mktemp("paper")
+    assert main(["paper", "--quick", "--only", CAR_ITEMS, "--out", str(folder)]) == 0
+    return folder
+
+
+def png_size(path):
+    return struct.unpack(">II", path.read_bytes()[16:24])
+
+
+def test_the_report_has_every_item_in_both_units_and_nothing_is_missing(out):
+    text = (out / "REPORT.md").read_text()
+    assert "at a reduced size" in text and "Missing" not in text and "missing" not in text
+    for heading in ("## Table 1", "## Figure 5", "## Figure 6", "## Figure 9", "## Figure 10"):
+        assert heading in text
+    assert "| A | interactive | 2.45 ± 0.62 | 5 of 5 |" in text
+    assert "### In raw units" in text and "### In paper units" in text
+    assert not re.search(r"\bnan\b|None", text)
+
+
+def test_every_picture_of_the_report_is_there_as_png_and_svg(out):
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", (out / "REPORT.md").read_text())
+    assert len(pictures) == 10
+    for name in pictures:
+        assert png_size(out / name)[0] > 1000
+        assert (out / name).with_suffix(".svg").read_text().startswith("<?xml")
+
+
+def test_targets_that_are_reached_at_once_and_never_are_told_apart(out):
+    table = Plan(quick=True)
+    cells = table.cells(ITEMS["table1"], "raw")
+    records = {cell.key: read_record(out / "records" / f"{cell.key}.json") for cell in cells}
+    reasons = {key: record.reason for key, record in records.items()}
+    assert {reasons[key] for key in reasons if "target-A" in key} == {"satisfied"}
+    assert {reasons[key] for key in reasons if "target-C" in key or "pgmorl" in key} == {"budget"}
+    assert all(not records[key].questions[:-1] for key in records if "target-A" in key)
+
+
+def test_a_second_time_makes_nothing_and_writes_the_same_report(out, capsys):
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.suffix in (".md", ".json", ".svg")}
+    assert main(["paper", "--quick", "--only", CAR_ITEMS, "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count(": done") == 10 and "steps" not in printed
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_a_lost_record_comes_from_the_run_folder_without_training(out):
+    cell = Plan(quick=True).cells(ITEMS["fig5"], "raw")[0]
+    places = Places(out / "records", out / "work")
+    before = places.record(cell).read_bytes()
+    places.record(cell).unlink()
+    events = []
+    make(cell, places, lambda _, event: events.append(event))
+    assert not events and places.record(cell).read_bytes() == before
+
+
+@pytest.mark.parametrize("units", ["raw", "paper"])
+def test_an_interrupted_run_goes_on_to_the_same_record(out, tmp_path, units):
+    cell = Plan(quick=True).cells(ITEMS["fig5"], units)[0]
+    places = Places(tmp_path / "records", tmp_path / "work")
+
+    class Enough(Exception):
+        pass
+
+    def stop(_, event):
+        if isinstance(event, GenerationFinished) and event.state.generation == 1:
+            raise Enough
+
+    with pytest.raises(Enough):
+        make(cell, places, stop)
+    assert missing([cell], places) == [cell]
+    generations = []
+    resumed = make(
+        cell, places, lambda _, e: isinstance(e, GenerationFinished) and generations.append(e.state.generation)
+    )
+    assert generations == [2]
+    expected = read_record(Places(out / "records", out / "work").record(cell))
+    assert resumed.policies == expected.policies and resumed.questions == expected.questions
+    assert [each.front for each in resumed.generations] == [each.front for each in expected.generations]
+    assert [each.buffer for each in resumed.generations] == [each.buffer for each in expected.generations]
+
+
+def test_a_run_folder_of_other_settings_is_started_anew(tmp_path):
+    first, other = (Plan(quick=True, seeds=(seed,)).cells(ITEMS["fig5"], "raw")[0] for seed in (3, 4))
+    places = Places(tmp_path / "records", tmp_path / "work")
+    make(first, places, lambda *_: None)
+    (places.work / first.key).rename(places.work / other.key)
+    assert make(other, places, lambda *_: None).digest == other.config.digest()
+
+
+def test_the_report_says_what_is_missing(out, tmp_path, capsys):
+    for path in (out / "records").glob("mountaincar-raw-*seed-7.json"):
+        target = tmp_path / "records" / path.name
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(path.read_bytes())
+    assert main(["paper", "--quick", "--report", "--only", "table1,fig5,fig9", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "REPORT.md").read_text()
+    assert "Missing: table1 in raw units, 4 of 8 runs." in text
+    assert "Missing: fig5 in paper units, 8 of 8 runs." in text
+    assert "Not to be judged yet: runs are missing." in text
+    assert not (tmp_path / "work").exists()
+
+
+def test_a_run_that_breaks_down_is_told_and_the_others_are_made(out, tmp_path, monkeypatch, capsys):
+    def broken(cell, places, watch):
+        if cell.config.seed == 7:
+            raise TrainingFault("agent 2: loss is not finite in iteration 3")
+        return make(cell, places, watch)
+
+    monkeypatch.setattr("jmorl.paper.command.make", broken)
+    arguments = ["paper", "--quick", "--only", "fig5", "--units", "raw", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("broke down: agent 2: loss is not finite in iteration 3") == 4
+    assert len(list((tmp_path / "records").iterdir())) == 4
+    assert "Missing: fig5 in raw units, 4 of 8 runs." in (tmp_path / "REPORT.md").read_text()
+
+
+def test_an_unknown_item_is_refused(capsys):
+    with pytest.raises(SystemExit) as error:
+        main(["paper", "--only", "table3"])
+    assert error.value.code == 2 and "unknown table3" in capsys.readouterr().err
