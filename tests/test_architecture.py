@@ -19,15 +19,18 @@ MAY_IMPORT = {
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},
+    "jmorl.steering": {"jmorl.config", "jmorl.search"},
     "jmorl.run": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search")
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),
+        *("jmorl.steering",),
     },
     "jmorl.storage": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search")
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search"),
+        *("jmorl.steering",),
     },
     "jmorl.report": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
-        *("jmorl.run", "jmorl.search", "jmorl.storage"),
+        *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from jmorl.run import RunState
+from jmorl.steering import RunState
 from jmorl.storage.packing import PackingError, pack, unpack
 
 
