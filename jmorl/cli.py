@@ -9,7 +9,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -141,8 +141,45 @@ def _follow(continued: "Continued", user: DecisionMaker | None, options: argpars
         console.print(where, soft_wrap=True, highlight=False)
 
 
-def _checked_config(options: argparse.Namespace) -> Config:
-    """The config of the options; every problem, that of the output folder included, in one ConfigError."""
+def _studio(options: argparse.Namespace) -> None:
+    try:
+        import jmorl.studio.server as server
+    except ImportError as error:
+        raise ConfigError(["the studio needs NiceGUI: pip install 'jmorl[studio]'"]) from error
+    import secrets
+
+    import envs
+    from jmorl.storage.continuing import Continued
+    from jmorl.storage.run_folder import RunFolder
+    from jmorl.studio.guard import is_loopback
+    from jmorl.studio.session import Session
+    from jmorl.studio.view import PERSON
+
+    server.check_address(options.host, options.port)
+    session = Session()
+    with StopSignals("ending, after the generation that is going on; once more to end at once") as stop:
+        try:
+            if options.run:
+                session.open(options.run)
+            else:
+                config = _checked_config(options, {"user": PERSON})
+                folder = RunFolder.create(options.out, config, envs.make(config.env), options.force)
+                session.drive(Continued(folder, None))
+            token = options.token or (None if is_loopback(options.host) else secrets.token_urlsafe())
+            print(f"The studio is at {server.address(options.host, options.port, token)} (Ctrl-C ends it)", flush=True)
+            server.serve(session, options.host, options.port, token)
+        finally:
+            session.close()
+        path = session.view.path
+        print(f"What the run has is in {path}; open it again with: jmorl studio {path}")
+        stop.check()
+
+
+def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> Config:
+    """The config of the options, over defaults of a command's own.
+
+    Every problem, that of the output folder included, is in one ConfigError.
+    """
     from jmorl.storage.lock import FolderInUse
     from jmorl.storage.run_folder import check_free
 
@@ -154,7 +191,7 @@ def _checked_config(options: argparse.Namespace) -> Config:
     except FolderInUse as error:
         problems.append(f"out: {error}")
     try:
-        config = resolve(options.preset, options.config, _overrides(options))
+        config = resolve(options.preset, options.config, {**(defaults or {}), **_overrides(options)})
     except ConfigError as error:
         raise ConfigError(error.problems + problems) from None
     if problems:
@@ -275,6 +312,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "train": _train,
     "resume": _resume,
     "branch": _branch,
+    "studio": _studio,
     "show": _show,
     "evaluate": _evaluate,
     "play": _play,

@@ -32,6 +32,10 @@ MAY_IMPORT = {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
         *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage"),
     },
+    "jmorl.studio": {
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.playback", "jmorl.report"),
+        *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage"),
+    },
 }
 JAX = {"jax", "flax", "optax", "chex"}
 
