@@ -7,6 +7,7 @@ Exit codes: 0 done; 1 the run failed, what it had is kept; 2 bad input, nothing 
 import argparse
 import json
 import os
+import secrets
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +22,7 @@ from jmorl.signals import Interrupted, StopSignals
 
 if TYPE_CHECKING:
     from jmorl.storage.continuing import Continued
+    from jmorl.studio.session import Session
 
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
@@ -143,36 +145,40 @@ def _follow(continued: "Continued", user: DecisionMaker | None, options: argpars
 
 def _studio(options: argparse.Namespace) -> None:
     try:
-        import jmorl.studio.server as server
-    except ImportError as error:
-        raise ConfigError(["the studio needs NiceGUI: pip install 'jmorl[studio]'"]) from error
-    import secrets
+        from jmorl.studio import server
+    except ModuleNotFoundError as error:
+        raise ConfigError([f"the studio needs {error.name}: pip install 'jmorl[studio]'"]) from error
+    from jmorl.studio.guard import is_loopback
+    from jmorl.studio.session import Session
 
+    server.check_address(options.host, options.port)
+    token = options.token or (None if is_loopback(options.host) else secrets.token_urlsafe())
+    session = Session()
+    with StopSignals() as stop:
+        try:
+            _open(session, options)
+            print(f"The studio is at {server.address(options.host, options.port, token)} (Ctrl-C ends it)", flush=True)
+            with stop.asking():
+                server.serve(session, options.host, options.port, token)
+        except Interrupted as error:
+            error.add_note(f"what the run has is kept; open it again with: jmorl studio {session.view.path}")
+            raise
+        finally:
+            session.close()
+
+
+def _open(session: "Session", options: argparse.Namespace) -> None:
+    """Go on with the run that is named, or begin a new one."""
     import envs
     from jmorl.storage.continuing import Continued
     from jmorl.storage.run_folder import RunFolder
-    from jmorl.studio.guard import is_loopback
-    from jmorl.studio.session import Session
     from jmorl.studio.view import PERSON
 
-    server.check_address(options.host, options.port)
-    session = Session()
-    with StopSignals("ending, after the generation that is going on; once more to end at once") as stop:
-        try:
-            if options.run:
-                session.open(options.run)
-            else:
-                config = _checked_config(options, {"user": PERSON})
-                folder = RunFolder.create(options.out, config, envs.make(config.env), options.force)
-                session.drive(Continued(folder, None))
-            token = options.token or (None if is_loopback(options.host) else secrets.token_urlsafe())
-            print(f"The studio is at {server.address(options.host, options.port, token)} (Ctrl-C ends it)", flush=True)
-            server.serve(session, options.host, options.port, token)
-        finally:
-            session.close()
-        path = session.view.path
-        print(f"What the run has is in {path}; open it again with: jmorl studio {path}")
-        stop.check()
+    if options.run:
+        session.open(options.run)
+    else:
+        config = _checked_config(options, {"user": PERSON})
+        session.drive(Continued(RunFolder.create(options.out, config, envs.make(config.env), options.force), None))
 
 
 def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> Config:

@@ -2,6 +2,7 @@
 
 import platform
 import socket
+import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ def address(host: str, port: int, token: str | None) -> str:
 
 
 def serve(session: Session, host: str, port: int, token: str | None) -> None:
-    """Serve the page until a signal ends it."""
+    """Serve the page, in a thread of its own, until something is raised here: signals are for the caller to hear."""
     app.add_middleware(Guard, host=host, token=token)
     _add_files(session)
 
@@ -51,6 +52,17 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
     def page() -> None:
         Page(session)
 
+    serving = threading.Thread(target=_run, args=(host, port), name="server", daemon=True)
+    serving.start()
+    try:
+        serving.join()
+    finally:
+        if app.is_started:
+            app.shutdown()
+            serving.join()
+
+
+def _run(host: str, port: int) -> None:
     ui.run(
         host=host,
         port=port,
@@ -60,7 +72,6 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
         reload=False,
         tailwind=False,
         show_welcome_message=False,
-        loop="asyncio",  # whose signals are the process's own
         timeout_graceful_shutdown=1,
     )
 
