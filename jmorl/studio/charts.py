@@ -6,7 +6,7 @@ from nicegui import ui
 from nicegui.events import EChartPointClickEventArguments
 
 from jmorl.studio.curves import curve_options
-from jmorl.studio.front_chart import front_options, marks
+from jmorl.studio.front_chart import front_marks, front_options
 from jmorl.studio.parallel_chart import parallel_marks, parallel_options
 
 if TYPE_CHECKING:
@@ -27,41 +27,31 @@ class Charts:
                         picker = ui.select(names, value=place, label=title, on_change=self._picked)
                         picker.props("dense options-dense borderless")
                         setattr(self, f"picker_{place}", picker)
-            self.front = ui.echart(self._front_options(), on_point_click=self._point).classes("chart")
+            with ui.element("div").classes("chart"):
+                self.front = ui.echart({}, on_point_click=self._point)
+                self.front_marks = ui.echart({}).classes("overlay")
             self._add_legend()
         with ui.element("section").classes("panel lines").props('aria-label="Parallel coordinates"'):
-            self.parallel = ui.echart(parallel_options(page.view, page.desk), on_point_click=self._line)
-            self.parallel.classes("chart")
+            self.parallel = ui.echart({}, on_point_click=self._line)
+            self.parallel_marks = ui.echart({}).classes("overlay")
 
     def add_curves(self) -> None:
         """Put the curves of progress here."""
-        self.curves = ui.echart(curve_options(self.page.view)).classes("chart")
+        self.curves = ui.echart({})
 
     def show(self) -> None:
         """Everything anew."""
-        view, desk = self.page.view, self.page.desk
-        for chart, options in (
-            (self.front, self._front_options()),
-            (self.parallel, parallel_options(view, desk)),
-            (self.curves, curve_options(view)),
-        ):
-            chart.options.clear()
-            chart.options.update(options)
-            chart.update()
+        view = self.page.view
+        _draw(self.front, front_options(view, self.axes))
+        _draw(self.parallel, parallel_options(view))
+        _draw(self.curves, curve_options(view))
+        self.show_marks()
 
     def show_marks(self) -> None:
-        """Only what is laid out, and what follows from it: a few numbers, however many policies there are."""
-        changed = marks(self.page.view, self.page.desk, self.axes, self._asked())
-        self._send(self.front, changed)
-        self._send(self.parallel, [parallel_marks(self.page.view, self.page.desk)])
-
-    def _send(self, chart: ui.echart, last: list[dict[str, Any]]) -> None:
-        """Replace the last series."""
-        chart.options["series"][-len(last) :] = last
-        chart.run_chart_method("setOption", {"series": last})
-
-    def _front_options(self) -> dict[str, Any]:
-        return front_options(self.page.view, self.page.desk, self.axes, self._asked())
+        """Only what is laid out, and what follows from it: little, however many policies there are."""
+        view, desk = self.page.view, self.page.desk
+        _draw(self.front_marks, front_marks(view, desk, self.axes, self._asked()))
+        _draw(self.parallel_marks, parallel_marks(view, desk))
 
     def _asked(self) -> Any:
         dialogue = self.page.dialogue
@@ -91,6 +81,12 @@ class Charts:
                 with ui.element("span"):
                     ui.element("i").classes(look)
                     ui.label(text)
+
+
+def _draw(chart: ui.echart, options: dict[str, Any]) -> None:
+    chart.options.clear()
+    chart.options.update(options)
+    chart.update()
 
 
 def _numbers(event: EChartPointClickEventArguments) -> Any:

@@ -1,7 +1,4 @@
-"""The front as points: two of its objectives, what lies within the bounds, what was and what may be.
-
-Every chart has the same series in the same order, so that what changes can be sent alone.
-"""
+"""The front as points: two of its objectives, what lies within the bounds, what was and what may be."""
 
 from typing import Any
 
@@ -30,37 +27,49 @@ from jmorl.studio.view import View
 
 STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"
 GHOSTS = 6  # earlier fronts
+IN_FORCE = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
+PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
 MANY = 300  # policies; more are drawn smaller
 
 
-def front_options(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
-    """The whole chart, with the objectives `axes` to the right and upwards."""
+def front_options(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    """What stays while policies are looked at, with the objectives `axes` to the right and upwards."""
     limits = _limits(view)
     return {
-        **base(),
-        "grid": {"left": 62, "right": 18, "top": 14, "bottom": 44},
-        "xAxis": _axis(view.objectives[axes[0]], limits[:, axes[0]], gap=26),
-        "yAxis": _axis(view.objectives[axes[1]], limits[:, axes[1]], gap=46),
+        **_frame(view, axes, limits, visible=True),
         "series": [
-            _in_force(view, axes, limits),
+            _area("bounds", view.bounds, axes, limits, IN_FORCE),
             _ghosts(view, axes),
             _members(view, axes, inside=False),
             _members(view, axes, inside=True),
             _journey(view, axes),
             _result(view, axes),
-            *marks(view, desk, axes, asked),
         ],
     }
 
 
-def marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuestion | None) -> list[dict[str, Any]]:
-    """What follows from what is laid out: the last series, which may be sent without the others."""
-    return [
-        _proposed(view, desk, axes, _limits(view)),
-        _expected(desk, axes),
-        _laid_out(view, desk, axes),
-        _points(asked, axes),
-    ]
+def front_marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
+    """What follows from what is laid out: a chart to put over the other, so that only little is drawn anew."""
+    limits = _limits(view)
+    bounds = desk.prospect.bounds if desk.prospect else np.full(len(view.objectives), -np.inf)
+    return {
+        **_frame(view, axes, limits, visible=False),
+        "series": [
+            _area("bounds that would follow", bounds, axes, limits, PROPOSED),
+            _expected(desk, axes),
+            _laid_out(view, desk, axes),
+            _points(asked, axes),
+        ],
+    }
+
+
+def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
+    """Where both charts have their axes."""
+    x, y = (
+        _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
+    )
+    grid = {"left": 62, "right": 18, "top": 14, "bottom": 44}
+    return {**base(), "grid": grid, "xAxis": x, "yAxis": y}
 
 
 def _limits(view: View) -> np.ndarray:
@@ -76,10 +85,11 @@ def _limits(view: View) -> np.ndarray:
     return around(np.concatenate(shown))
 
 
-def _axis(objective: Objective, limits: np.ndarray, gap: int) -> dict[str, Any]:
+def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> dict[str, Any]:
     low, high = limits.tolist()
     return {
         "type": "value",
+        "show": visible,
         "name": better(objective),
         "nameLocation": "middle",
         "nameGap": gap,
@@ -158,19 +168,6 @@ def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
     data = [[view.result.id, *plain(view.result.values)[0], "the result"]] if view.result else []
     looks = {"symbol": STAR, "symbolSize": 20, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
     return _scatter("result", data, axes, silent=True, z=6, **looks)
-
-
-def _in_force(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
-    """The bounds in force."""
-    look = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
-    return _area("bounds", view.bounds, axes, limits, look)
-
-
-def _proposed(view: View, desk: Desk, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
-    """The bounds that would follow from the policy in focus."""
-    bounds = desk.prospect.bounds if desk.prospect else np.full(len(view.objectives), -np.inf)
-    look = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
-    return _area("bounds that would follow", bounds, axes, limits, look)
 
 
 def _area(

@@ -12,64 +12,68 @@ from jmorl.studio.looks import BLUE, GREY, INK, LETTER_COLOURS, PALE, TEXT, base
 from jmorl.studio.view import View
 
 
-def parallel_options(view: View, desk: Desk) -> dict[str, Any]:
-    """The whole chart; up is better on every axis. Lines are [values..., policy]."""
-    opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
-    inside = within(view.values, view.bounds) if view.front else np.zeros(0, bool)
-    limits = around(np.concatenate([view.values, view.bounds[None]])) if _bounded(view) else None
-    if limits is None:
-        limits = around(view.values) if view.front else np.stack([np.zeros(len(view.objectives))] * 2) + [[0], [1]]
-    axes = [
-        {"dim": index, "name": f"↑ {objective_label(objective)}", "min": float(low), "max": float(high)}
-        for index, (objective, low, high) in enumerate(zip(view.objectives, *limits, strict=True))
-    ]
+def parallel_options(view: View) -> dict[str, Any]:
+    """What stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
+    inside = within(view.values, view.bounds)
     return {
-        **base(),
-        "parallel": {
-            "left": 70,
-            "right": 90,
-            "top": 34,
-            "bottom": 14,
-            "parallelAxisDefault": {
-                "nameTextStyle": TEXT,
-                "nameGap": 12,
-                "axisLabel": {**TEXT, "showMinLabel": False, "showMaxLabel": False},
-                "axisLine": {"lineStyle": {"color": GREY}},
-            },
-        },
-        "parallelAxis": axes,
+        **_frame(view, visible=True),
         "series": [
-            _lines("outside the bounds", view, ~inside, {"color": PALE, "width": 1, "opacity": opacity}),
-            _lines("within the bounds", view, inside, {"color": BLUE, "width": 1.2, "opacity": opacity}),
+            _lines("outside the bounds", view, ~inside, PALE),
+            _lines("within the bounds", view, inside, BLUE),
             _bounds(view),
-            parallel_marks(view, desk),
         ],
     }
 
 
 def parallel_marks(view: View, desk: Desk) -> dict[str, Any]:
-    """The lines of what is laid out, the last series."""
+    """The lines of what is laid out: a chart to put over the other."""
     lines = [
         {
             "value": [*plain(policy.values)[0], policy.id],
-            "lineStyle": {"color": LETTER_COLOURS[letter], "width": 4 if policy.id == desk.focus else 2.5},
+            "lineStyle": {
+                "color": LETTER_COLOURS[letter],
+                "width": 4 if policy.id == desk.focus else 2.5,
+                "opacity": 1,
+            },
         }
         for policy_id, letter in desk.letters.items()
         if (policy := view.policy(policy_id))
     ]
-    return {"type": "parallel", "id": "laid out", "name": "laid out", "data": lines, "silent": True, "z": 5}
+    series = {"type": "parallel", "id": "laid out", "name": "laid out", "data": lines, "silent": True}
+    return {**_frame(view, visible=False), "series": [series]}
+
+
+def _frame(view: View, visible: bool) -> dict[str, Any]:
+    """Where both charts have their axes."""
+    shown = np.concatenate([view.values, view.bounds[None]]) if _bounded(view) else view.values
+    limits = around(shown) if len(shown) else np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
+    look = {
+        "nameTextStyle": TEXT,
+        "nameGap": 12,
+        "axisLabel": {**TEXT, "show": visible, "showMinLabel": False, "showMaxLabel": False},
+        "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
+        "axisTick": {"show": visible},
+    }
+    names = [f"↑ {objective_label(objective)}" if visible else "" for objective in view.objectives]
+    axes = [
+        {"dim": index, "name": name, "min": float(low), "max": float(high), **look}
+        for index, (name, low, high) in enumerate(zip(names, *limits, strict=True))
+    ]
+    return {**base(), "parallel": {"left": 70, "right": 90, "top": 34, "bottom": 14}, "parallelAxis": axes}
 
 
 def _bounded(view: View) -> bool:
     return bool(view.front) and bool(np.isfinite(view.bounds).all())
 
 
-def _lines(name: str, view: View, kept: np.ndarray, look: dict[str, Any]) -> dict[str, Any]:
+def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, Any]:
     data = [
         [*values, policy.id]
         for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
         if shown
     ]
+    opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
+    look = {"color": colour, "width": 1.2, "opacity": opacity}
     return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": look, "z": 2}
 
 

@@ -16,7 +16,7 @@ from jmorl.steering import Prospect
 from jmorl.studio import dialogue, words
 from jmorl.studio.curves import curve_options
 from jmorl.studio.desk import Desk
-from jmorl.studio.front_chart import front_options, marks
+from jmorl.studio.front_chart import front_marks, front_options
 from jmorl.studio.parallel_chart import parallel_marks, parallel_options
 from jmorl.studio.view import Generation, View
 
@@ -51,13 +51,13 @@ def series(options):
 
 
 def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(view):
-    shown = series(front_options(view, Desk(), (1, 0), None))
+    shown = series(front_options(view, (1, 0)))
     inside, outside = shown["within the bounds"], shown["outside the bounds"]
     assert {point[0] for point in inside["data"]} == {4, 9} and {point[0] for point in outside["data"]} == {2, 5}
     for point in (*inside["data"], *outside["data"]):
         assert tuple(point[1:3]) == VALUES[point[0]]
     assert inside["encode"] == {"x": 2, "y": 1}
-    options = front_options(view, Desk(), (1, 0), None)
+    options = front_options(view, (1, 0))
     assert shown["bounds"]["markArea"]["data"] == [
         [{"coord": [-45.0, -82.0]}, {"coord": [options["xAxis"]["max"], options["yAxis"]["max"]]}]
     ]
@@ -65,7 +65,7 @@ def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(vie
 
 
 def test_axes_hold_the_front_the_bounds_and_the_choice(view):
-    options = front_options(replace(view, bounds=np.array([-200.0, -45.0])), Desk(), (0, 1), None)
+    options = front_options(replace(view, bounds=np.array([-200.0, -45.0])), (0, 1))
     assert options["xAxis"]["min"] < -200 and options["xAxis"]["max"] > -60
     assert options["yAxis"]["min"] < -60 and options["yAxis"]["max"] > -10
     assert "time (-steps)" in options["xAxis"]["name"] and "better" in options["xAxis"]["name"]
@@ -76,8 +76,10 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
     empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
     for shown in (view, empty):
         for options in (
-            front_options(shown, Desk(), (0, 1), asked),
-            parallel_options(shown, Desk()),
+            front_options(shown, (0, 1)),
+            front_marks(shown, Desk().with_policy(9), (0, 1), asked),
+            parallel_options(shown),
+            parallel_marks(shown, Desk().with_policy(9)),
             curve_options(shown),
         ):
             assert options["tooltip"]["renderMode"] == "richText"
@@ -85,24 +87,40 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
             json.dumps(options, allow_nan=False)
 
 
-def test_every_chart_has_the_same_series_so_that_the_last_can_be_sent_alone(view):
-    desk = Desk().with_policy(9)
+def test_marks_lie_exactly_over_the_chart(view):
+    chart, marks = front_options(view, (1, 0)), front_marks(view, Desk().with_policy(9), (1, 0), None)
+    for axis in ("xAxis", "yAxis"):
+        assert [chart[axis][end] for end in ("min", "max")] == [marks[axis][end] for end in ("min", "max")]
+        assert chart[axis]["show"] and not marks[axis]["show"]
+    assert chart["grid"] == marks["grid"]
+    lines, marked = parallel_options(view), parallel_marks(view, Desk().with_policy(9))
+    for shown, hidden in zip(lines["parallelAxis"], marked["parallelAxis"], strict=True):
+        assert (shown["min"], shown["max"]) == (hidden["min"], hidden["max"]) and not hidden["name"]
+    assert all(lines["parallel"][side] == marked["parallel"][side] for side in ("left", "right", "top", "bottom"))
+
+
+def test_charts_have_the_same_series_whatever_there_is_to_see(view):
+    """The browser's chart merges what it is sent into what it has."""
     asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
-    without, with_all = front_options(view, Desk(), (0, 1), None), front_options(view, desk, (0, 1), asked)
-    assert [each["id"] for each in without["series"]] == [each["id"] for each in with_all["series"]]
-    assert with_all["series"][-4:] == marks(view, desk, (0, 1), asked)
-    assert parallel_options(view, desk)["series"][-1] == parallel_marks(view, desk)
+    empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
+    for much, little in (
+        (front_options(view, (0, 1)), front_options(empty, (0, 1))),
+        (front_marks(view, Desk().with_policy(9), (0, 1), asked), front_marks(empty, Desk(), (0, 1), None)),
+        (parallel_options(view), parallel_options(empty)),
+        (curve_options(view), curve_options(empty)),
+    ):
+        assert [each["id"] for each in much["series"]] == [each["id"] for each in little["series"]]
 
 
 def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
     expected = np.array([[-65.0, -30.0], [-75.0, -15.0]])
     prospect = Prospect(np.array([-75.0, -42.0]), np.array([False, True, False, False]), expected)
     desk = replace(Desk().with_policy(4).with_policy(9), prospects={9: prospect})
-    shown = series(front_options(view, desk, (0, 1), None))
+    shown = series(front_marks(view, desk, (0, 1), None))
     assert shown["bounds that would follow"]["markArea"]["data"][0][0] == {"coord": [-75.0, -42.0]}
     assert [point[1:3] for point in shown["expected by the model"]["data"]] == expected.tolist()
     assert [point["label"]["formatter"] for point in shown["laid out"]["data"]] == ["A", "B"]
-    unfocused = series(front_options(view, replace(desk, focus=4), (0, 1), None))
+    unfocused = series(front_marks(view, replace(desk, focus=4), (0, 1), None))
     assert (
         not unfocused["bounds that would follow"]["markArea"]["data"] and not unfocused["expected by the model"]["data"]
     )
@@ -112,7 +130,7 @@ def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
 
 
 def test_lines_across_the_axes_have_the_values_of_the_policies(view):
-    shown = series(parallel_options(view, Desk().with_policy(2)))
+    shown = series(parallel_options(view)) | series(parallel_marks(view, Desk().with_policy(2)))
     assert {line[-1]: tuple(line[:-1]) for line in shown["within the bounds"]["data"]} == {
         number: VALUES[number] for number in (4, 9)
     }
@@ -123,8 +141,7 @@ def test_lines_across_the_axes_have_the_values_of_the_policies(view):
 def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
     final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
     borders = [
-        series(front_options(each, Desk(), (0, 1), None))["outside the bounds"]["itemStyle"]["borderColor"]
-        for each in (view, final)
+        series(front_options(each, (0, 1)))["outside the bounds"]["itemStyle"]["borderColor"] for each in (view, final)
     ]
     assert borders == ["#0072B2", "#b8b8b8"]
     assert final.choosable(4) and not final.choosable(2) and view.choosable(2)
