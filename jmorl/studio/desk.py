@@ -15,6 +15,7 @@ class Desk:
     places: Mapping[str, int] = field(default_factory=dict)  # letter -> policy; the one looked at longest first
     focus: int | None = None  # one of the policies
     more_of: int | None = None  # index of an objective
+    than: int | None = None  # the policy that the others are to have more than; None: all are shown, in order
     prospects: Mapping[int, Prospect] = field(default_factory=dict)  # policy -> what choosing it would mean, if known
 
     @property

@@ -24,6 +24,7 @@ from jmorl.studio.looks import (
     plain,
 )
 from jmorl.studio.view import View
+from jmorl.studio.words import wanted
 
 STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"
 GHOSTS = 6  # earlier fronts
@@ -57,6 +58,7 @@ def front_marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuest
         "series": [
             _area("bounds that would follow", bounds, axes, limits, PROPOSED),
             _expected(desk, axes),
+            _wanted(view, desk, axes),
             _laid_out(view, desk, axes),
             _points(asked, axes),
         ],
@@ -188,6 +190,14 @@ def _expected(desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
     data = [[0, *values, ""] for values in plain(expected)] if len(expected) else []
     looks = {"symbol": "path://M4 0h2v4h4v2h-4v4h-2v-4h-4v-2h4z", "symbolSize": 8, "itemStyle": {"color": GREEN}}
     return _scatter("expected by the model", data, axes, silent=True, z=2, **looks)
+
+
+def _wanted(view: View, desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
+    """Rings around what has more of what there should be more of."""
+    more = set(wanted(view, desk) or ())
+    data = [[policy.id, *plain(policy.values)[0], ""] for policy in view.front if policy.id in more]
+    look = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
+    return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=look, z=6)
 
 
 def _laid_out(view: View, desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:

@@ -92,13 +92,6 @@ class Page:
         self.session.more_of(None if self.desk.more_of == objective else objective)
         self.refresh()
 
-    def wanted(self) -> list[int] | None:
-        """The policies that have more of what there should be more of, the least change first; None for all."""
-        if self.desk.more_of is None:
-            return None
-        focused = self.view.policy(self.desk.focus) if self.desk.focus is not None else None
-        return words.more_of(self.view, self.desk.more_of, focused or self.view.previous)
-
     async def step_back(self, run_id: str, generation: int) -> None:
         """Ask an earlier question again, in a branch."""
         await self._wait_for("Stepping back", self.session.step_back, run_id, generation)
@@ -201,7 +194,7 @@ class Page:
 
     def _look_along(self, step: int) -> None:
         """Look at the next policy of those shown, in the order of the first objective in the chart."""
-        wanted = self.wanted()
+        wanted = words.wanted(self.view, self.desk)
         shown = [policy for policy in self.view.front if wanted is None or policy.id in wanted]
         order = [policy.id for policy in sorted(shown, key=lambda policy: float(policy.values[self.charts.axes[0]]))]
         if order:

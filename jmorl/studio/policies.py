@@ -6,6 +6,7 @@ from nicegui.element import Element
 
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
+from jmorl.studio import words
 from jmorl.studio.looks import decimals, plain
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class PolicyTable:
         desk = self.page.desk
         by = None if desk.more_of is None or desk.more_of == self.by else desk.more_of + 1
         self.by = desk.more_of
-        self.grid.run_method("lay_out", desk.letters, desk.focus, self.page.wanted(), by)
+        self.grid.run_method("lay_out", desk.letters, desk.focus, words.wanted(self.page.view, desk), by)
 
     def _columns(self) -> list[dict[str, Any]]:
         view = self.page.view

@@ -26,7 +26,7 @@ class QuestionBar:
                 ui.button("Go on", on_click=self.stopping.close).props("flat no-caps")
 
     def show(self) -> None:
-        self.heading.set_text(words.heading(self.page.view))
+        self.heading.set_text(words.heading(self.page.view, self.page.desk))
         self.buttons.clear()
         with self.buttons:
             if self.page.view.front:

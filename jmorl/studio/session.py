@@ -76,8 +76,10 @@ class Session:
         self._rearrange(lambda desk: desk.without(policy))
 
     def more_of(self, objective: int | None) -> None:
-        """Ask for more of an objective than the policy in focus, or the last choice, has; None: no longer."""
-        self._rearrange(lambda desk: replace(desk, more_of=objective))
+        """Ask for more of an objective than the policy in focus, or else the last choice, has; None: no longer."""
+        previous = self.view.previous.id if self.view.previous else None
+        than = self.desk.focus if self.desk.focus is not None else previous
+        self._rearrange(lambda desk: replace(desk, more_of=objective, than=than))
 
     def history(self) -> tuple[Branch, ...]:
         """The run that is open among its branches."""

@@ -8,6 +8,7 @@ from jmorl.display.text import duration, number_format, plural, short_count, val
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
 from jmorl.steering import Prospect
+from jmorl.studio.desk import Desk
 from jmorl.studio.view import PERSON, View
 
 KEYS = (
@@ -68,9 +69,12 @@ def share_done(view: View, now: float) -> float:
     return timeline.steps(now) / timeline.total_steps if timeline else float(view.result is not None)
 
 
-def heading(view: View) -> str:
+def heading(view: View, desk: Desk) -> str:
     """What is asked, or what there is to see."""
-    question = view.question
+    question, more = view.question, wanted(view, desk)
+    if more is not None and desk.more_of is not None and desk.than is not None:
+        label = view.objectives[desk.more_of].label
+        return f"{plural(len(more), 'policy')} with more {label} than policy {desk.than}"
     if question:
         policies = plural(len(question.front), "policy")
         if question.purpose == "final":
@@ -126,12 +130,14 @@ def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
     return f"{ruled_out} The model expects up to {best}."
 
 
-def more_of(view: View, objective: int, reference: Policy | None) -> list[int]:
-    """The policies that have more of an objective than the reference, the least change first; without one, all."""
-    members = sorted(view.front, key=lambda policy: float(policy.values[objective]))
-    return [
-        policy.id for policy in members if reference is None or policy.values[objective] > reference.values[objective]
-    ]
+def wanted(view: View, desk: Desk) -> list[int] | None:
+    """The policies that have more of what there should be more of, the least change first; None for all."""
+    if desk.more_of is None:
+        return None
+    reference = view.policy(desk.than) if desk.than is not None else None
+    least = reference.values[desk.more_of] if reference else -np.inf
+    members = sorted(view.front, key=lambda policy: float(policy.values[desk.more_of]))
+    return [policy.id for policy in members if policy.values[desk.more_of] > least]
 
 
 def minus(text: str) -> str:

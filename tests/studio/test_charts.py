@@ -147,17 +147,26 @@ def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
     assert final.choosable(4) and not final.choosable(2) and view.choosable(2)
 
 
-@pytest.mark.parametrize(("objective", "reference", "expected"), [(0, 4, [9, 2]), (1, 4, [5]), (0, None, [5, 4, 9, 2])])
-def test_more_of_an_objective_lists_the_least_change_first(view, objective, reference, expected):
-    assert words.more_of(view, objective, view.policy(reference) if reference else None) == expected
+@pytest.mark.parametrize(("objective", "than", "expected"), [(0, 4, [9, 2]), (1, 4, [5]), (0, None, [5, 4, 9, 2])])
+def test_more_of_an_objective_lists_the_least_change_first(view, objective, than, expected):
+    desk = Desk(more_of=objective, than=than)
+    assert words.wanted(view, desk) == expected
+    rings = series(front_marks(view, desk, (0, 1), None))["more of an objective"]["data"]
+    assert {ring[0] for ring in rings} == set(expected)
+
+
+def test_with_nothing_wanted_there_is_no_ring(view):
+    assert words.wanted(view, Desk()) is None
+    assert not series(front_marks(view, Desk(), (0, 1), None))["more of an objective"]["data"]
 
 
 def test_the_heading_says_what_is_asked(view):
-    assert words.heading(view) == "Generation 2: which of these 4 policies do you prefer?"
+    assert words.heading(view, Desk()) == "Generation 2: which of these 4 policies do you prefer?"
+    assert words.heading(view, Desk(more_of=0, than=4)) == "2 policies with more time than policy 4"
     final = replace(view, question=replace(view.question, purpose="final"))
-    assert words.heading(final) == "The run is over. Which of these 4 policies is its result?"
+    assert words.heading(final, Desk()) == "The run is over. Which of these 4 policies is its result?"
     ended = replace(view, question=None, result=view.front[2], timeline=None)
-    assert words.heading(ended) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
+    assert words.heading(ended, Desk()) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
 
 
 @pytest.mark.parametrize(

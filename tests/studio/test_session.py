@@ -195,6 +195,19 @@ def test_what_is_laid_out_is_seen_in_the_light_of_the_question(session):
     assert session.desk.focus is None
 
 
+def test_more_is_more_than_the_policy_that_was_in_focus_when_it_was_asked_for(session):
+    question = session.question()
+    first, second = question.front[0].id, question.front[-1].id
+    session.more_of(1)
+    assert (session.desk.more_of, session.desk.than) == (1, None)  # nothing to compare with
+    session.look_at(first)
+    session.more_of(1)
+    session.look_at(second)
+    assert session.desk.than == first
+    session.more_of(None)
+    assert session.desk.more_of is None
+
+
 def test_enautilus_in_a_finished_run_is_what_the_command_would_have_been_led_to(session):
     answer_all(session)
     session.begin_dialogue(3, 2)
