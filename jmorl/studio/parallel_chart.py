@@ -50,7 +50,7 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
     look = {
         "nameTextStyle": TEXT,
         "nameGap": 12,
-        "axisLabel": {**TEXT, "show": visible, "showMinLabel": False, "showMaxLabel": False},
+        "axisLabel": {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False},
         "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
         "axisTick": {"show": visible},
     }

@@ -16,6 +16,7 @@ class QuestionBar:
     def __init__(self, page: "Page"):
         self.page = page
         self.generations = 1  # to go on for before the next question
+        self.shown: tuple[object, ...] = ()  # what the buttons are for
         with ui.element("section").classes("bar question").props('aria-label="The question"'):
             self.heading = ui.label().classes("heading").props('role="status" aria-live="polite"')
             self.buttons = ui.element("div").classes("buttons")
@@ -26,16 +27,21 @@ class QuestionBar:
                 ui.button("Go on", on_click=self.stopping.close).props("flat no-caps")
 
     def show(self) -> None:
-        self.heading.set_text(words.heading(self.page.view, self.page.desk))
+        view, desk = self.page.view, self.page.desk
+        self.heading.set_text(words.heading(view, desk))
+        shown = id(view.question), id(view.result), view.timeline is None, bool(view.front), desk.more_of, view.run
+        if shown == self.shown:  # nobody shall lose a button that they are about to press
+            return
+        self.shown = shown
         self.buttons.clear()
         with self.buttons:
-            if self.page.view.front:
+            if view.front:
                 self._add_more()
-            if self.page.view.question:
+            if view.question:
                 self._add_answers()
-            elif self.page.view.result:
+            elif view.result:
                 self._add_result()
-            elif self.page.view.timeline is None:
+            elif view.timeline is None:
                 ui.button("Go on with this run", on_click=self._go_on).props("no-caps dense color=primary")
 
     def keep(self) -> None:

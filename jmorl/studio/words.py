@@ -118,6 +118,8 @@ def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
     question = view.question
     if question is None or question.purpose != "steer":
         return f"born in generation {policy.generation}"
+    if not view.choosable(policy.id):
+        return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
     if prospect is None:
         return "Working out what choosing it would mean …"
     formats = formats_of(view)

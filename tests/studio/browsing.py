@@ -9,7 +9,7 @@ FLAGS = (
     *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
     *("--disable-component-update", "--disable-sync"),
 )
-PATIENCE = 240_000  # milliseconds
+PATIENCE = 400_000  # milliseconds
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import httpx
 
-PATIENCE = 180  # seconds
+PATIENCE = 400  # seconds
 
 
 def free_port():

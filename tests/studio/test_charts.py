@@ -112,6 +112,11 @@ def test_charts_have_the_same_series_whatever_there_is_to_see(view):
         assert [each["id"] for each in much["series"]] == [each["id"] for each in little["series"]]
 
 
+def test_what_has_left_the_front_says_that_it_cannot_be_chosen(view):
+    gone = policy(77, (-99.0, -99.0))
+    assert "cannot be chosen" in words.consequences(replace(view, previous=gone), None, gone)
+
+
 def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
     expected = np.array([[-65.0, -30.0], [-75.0, -15.0]])
     prospect = Prospect(np.array([-75.0, -42.0]), np.array([False, True, False, False]), expected)
