@@ -1,4 +1,4 @@
-"""The studio in a real browser, against a real training run on MountainCar."""
+"""The studio in a real browser: a whole run on MountainCar, and what must not be lost, on a small one."""
 
 import json
 
@@ -7,18 +7,26 @@ import pytest
 
 from jmorl.storage.policy_file import load_policy
 from jmorl.storage.stored_run import read_run
+from tests.registered import ThreeWays
 from tests.studio.browsing import Tab, chromium
 from tests.studio.serving import Served, free_port
 
 pytestmark = pytest.mark.studio
 
-SMALL = ("--population.warmup-iterations", 2, "--population.iterations", 2, "--evaluation.episodes", 8)
 
 
 @pytest.fixture(scope="module")
 def browser():
     with chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="module")
+def small(small_config, tmp_path_factory):
+    """The settings of a run of seconds: three generations of an environment that any process knows by its module."""
+    config = tmp_path_factory.mktemp("config") / "config.toml"
+    config.write_text(small_config.replace(env=f"tests.registered:{ThreeWays.id}").to_toml())
+    return "--config", config
 
 
 def decisions(path):
@@ -114,9 +122,9 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
     assert "go on" not in "".join(studio.log) and studio.process.returncode == 143
 
 
-def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, tmp_path):
+def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, small, tmp_path):
     path, port = tmp_path / "run", free_port()
-    with Served("--out", path, "--steps", 700_000, *SMALL, port=port) as studio:
+    with Served("--out", path, *small, port=port) as studio:
         tab = Tab(browser, studio.address)
         tab.asked(1)
         policy = tab.look_at(1)
@@ -145,9 +153,9 @@ def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, 
         assert len(decisions(path)) == 2
 
 
-def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, tmp_path):
+def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, small, tmp_path):
     path = tmp_path / "run"
-    with Served("--out", path, "--steps", 700_000, *SMALL) as studio:
+    with Served("--out", path, *small) as studio:
         tabs = [Tab(browser, studio.address) for _ in range(2)]
         for tab in tabs:
             tab.asked(1)
@@ -163,9 +171,9 @@ def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, tmp_path)
         assert [each["generation"] for each in decisions(path)] == [1]
 
 
-def test_the_keyboard_is_enough(browser, tmp_path):
+def test_the_keyboard_is_enough(browser, small, tmp_path):
     path = tmp_path / "run"
-    with Served("--out", path, "--steps", 700_000, *SMALL) as studio:
+    with Served("--out", path, *small) as studio:
         tab = Tab(browser, studio.address)
         tab.asked(1)
         keys = tab.page.keyboard
@@ -174,7 +182,7 @@ def test_the_keyboard_is_enough(browser, tmp_path):
         keys.press("ArrowRight")
         tab.page.locator(".place").nth(1).wait_for()
         keys.press("2")
-        tab.page.locator('[aria-pressed="true"]', has_text="fuel").wait_for()
+        tab.page.locator('[aria-pressed="true"]', has_text="east").wait_for()
         keys.press("2")
         keys.press("x")
         tab.page.locator(".place.focus").wait_for()
