@@ -1,15 +1,16 @@
 """A run beside a page: driven in a thread of its own, shown as immutable records, steered by commands.
 
 The run never waits for anybody but the person who is asked. Whoever shows it reads `view`, `desk` and `dialogue`,
-each replaced as a whole, and compares them by identity with what was shown last. Commands come from one thread;
-those that say so take as long as a generation.
+each replaced as a whole, and compares them by identity with what was shown last. Some commands wait for the generation
+that is going on, and say so.
 """
 
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,6 +41,7 @@ class Session:
         self.dialogue: Dialogue | None = None
         self.leaving = False  # the run is about to be left, after its generation
         self._lock = threading.Lock()  # of the desk, which a thread adds to
+        self._moving = threading.Lock()  # while one run is left for another
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
         self._thinking = ThreadPoolExecutor(1, "prospects")
@@ -91,18 +93,20 @@ class Session:
         Waits for the generation that is going on. Raises as `branch` does.
         """
         path = self._in_history(run).path
-        self.leave()
-        try:
-            self.drive(branch(path, generation - 1, free_folder(path), PERSON))
-        except Exception:
-            self._show(self.view.path)
-            raise
+        with self._move():
+            self.leave()
+            try:
+                self.drive(branch(path, generation - 1, free_folder(path), PERSON))
+            except Exception:
+                self._show(self.view.path)
+                raise
 
     def switch(self, run: str) -> None:
         """Open another run of the history. Waits for the generation that is going on; raises as `open` does."""
         path = self._in_history(run).path
-        self.leave()
-        self.open(path)
+        with self._move():
+            self.leave()
+            self.open(path)
 
     def begin_dialogue(self, iterations: int, points: int) -> None:
         """Begin E-NAUTILUS on the front. Raises ValueError if there is none, or for numbers below 1."""
@@ -145,6 +149,16 @@ class Session:
         """Leave the run, and do nothing any more."""
         self.leave()
         self._thinking.shutdown(cancel_futures=True)
+
+    @contextmanager
+    def _move(self) -> Iterator[None]:
+        """One at a time. Raises ValueError for the second."""
+        if not self._moving.acquire(blocking=False):
+            raise ValueError("another tab is just leaving this run; nothing has changed")
+        try:
+            yield
+        finally:
+            self._moving.release()
 
     def _run(self, continued: Continued, person: Person | None) -> None:
         """What the thread does."""

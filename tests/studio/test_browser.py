@@ -14,7 +14,6 @@ from tests.studio.serving import Served, free_port
 pytestmark = pytest.mark.studio
 
 
-
 @pytest.fixture(scope="module")
 def browser():
     with chromium() as browser:

@@ -123,6 +123,23 @@ def test_stepping_back_begins_a_branch_and_the_run_left_behind_can_be_taken_up(s
     assert session.question().generation == 3 and session.view.path == path.with_name("run-3")
 
 
+def test_of_two_that_step_back_at_once_the_second_is_told(session, monkeypatch):
+    question, told = session.question(), []
+    leave = session.leave
+
+    def meanwhile():
+        with pytest.raises(ValueError, match="another tab is just leaving"):
+            session.step_back(session.view.run, 1)
+        told.append(True)
+        leave()
+
+    monkeypatch.setattr(session, "leave", meanwhile)
+    session.step_back(session.view.run, question.generation)
+    assert told and session.question().generation == 1
+    monkeypatch.undo()
+    assert [branch.name for branch in session.history()] == ["run", "run-2"]
+
+
 def test_only_runs_of_the_history_can_be_opened(session):
     session.question()
     with pytest.raises(ValueError, match="no run of this history"):
