@@ -4,18 +4,30 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO_OUT ?= runs/demo
 INSTALLED := $(VENV)/.installed
+BROWSER := $(VENV)/.browser
 
-.PHONY: demo test test-slow check format bench bench-physics bench-checkpoints quality paper clean
+.PHONY: demo studio test test-slow test-studio screenshots check format bench bench-physics bench-checkpoints bench-studio \
+	quality paper clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
 	$(BIN)/jmorl show $(DEMO_OUT)
+
+studio: $(INSTALLED)  ## steer a run on MountainCar yourself, on a web page; the address is printed
+	$(BIN)/jmorl studio --env mo-mountaincarcontinuous-v0
 
 test: $(INSTALLED)  ## the test suite (a few minutes)
 	$(BIN)/python -m pytest
 
 test-slow: $(INSTALLED)  ## the tests that take minutes each: physics, interrupted runs, learning
 	$(BIN)/python -m pytest -m slow
+
+test-studio: $(BROWSER)  ## the studio in a real browser, against real training runs (minutes)
+	$(BIN)/python -m pytest -m studio
+
+screenshots: $(BROWSER)  ## the pictures of the studio in the README, made by that test
+	mkdir -p docs/studio
+	STUDIO_SCREENSHOTS=docs/studio $(BIN)/python -m pytest -m studio -k from_the_start
 
 check: $(INSTALLED)  ## lint, format and types
 	$(BIN)/ruff check .
@@ -32,6 +44,9 @@ bench: $(INSTALLED)  ## speed and memory, beside morl-baselines; the first time 
 bench-checkpoints: $(INSTALLED)  ## what checkpoints cost, as a share of a generation
 	$(BIN)/python -m benchmarks.checkpoints
 
+bench-studio: $(BROWSER)  ## how fast the studio answers, and what it costs the training
+	$(BIN)/python -m benchmarks.studio
+
 bench-physics: $(INSTALLED)  ## accuracy and speed of the half cheetah's dynamics, beside MuJoCo and MJX (5 minutes)
 	$(BIN)/python -m benchmarks.physics
 
@@ -43,8 +58,17 @@ paper: $(INSTALLED)  ## the paper's experiments in its units and in raw ones: ho
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium,mjx,video]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium,mjx,studio,video]'
 	touch $@
+
+$(BROWSER): $(INSTALLED) /usr/bin/chromium
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[browser-tests]'
+	touch $@
+
+/usr/bin/chromium:
+	@test "$$(id -u)" = 0 && command -v apt-get > /dev/null || \
+		{ echo "the browser tests need $@: install Debian's package chromium" >&2; exit 1; }
+	apt-get update -q && apt-get install -q -y --no-install-recommends chromium
 
 clean:
 	rm -rf $(VENV) .venv-peer build *.egg-info .mypy_cache .ruff_cache .pytest_cache

@@ -21,6 +21,7 @@ def parser() -> argparse.ArgumentParser:
     commands = whole.add_subparsers(dest="command", metavar="COMMAND", required=True)
     _add_train(commands)
     _add_continuing(commands)
+    _add_studio(commands)
 
     enautilus = commands.add_parser(
         "enautilus", help="choose a policy from the front of a finished run, step by step (E-NAUTILUS)"
@@ -62,10 +63,7 @@ def _add_train(commands: Any) -> None:
         description="Preset, then config file, then flags: each overrides the one before.",
         formatter_class=argparse.RawTextHelpFormatter,
     )
-    train.add_argument("--preset", default="default", help=f"{', '.join(PRESETS)} (default: default)")
-    train.add_argument("--config", type=Path, metavar="FILE", help="settings as TOML, for instance a run's config.toml")
-    train.add_argument("--out", type=Path, metavar="FOLDER", help="run folder (default: runs/DATE-TIME)")
-    train.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
+    _add_new_run(train)
     _add_output(train)
     _add_settings(train, train.add_argument_group("settings"), Config, "")
 
@@ -84,6 +82,30 @@ def _add_paper(commands: Any) -> None:
     paper.add_argument("--report", action="store_true", help="make no runs, only the report of those there are")
     paper.add_argument("--out", type=Path, metavar="FOLDER", help="default: benchmarks/paper, or runs/paper-quick")
     paper.add_argument("--work", type=Path, metavar="FOLDER", help="run folders (default: runs/paper, or OUT/work)")
+
+
+def _add_studio(commands: Any) -> None:
+    studio = commands.add_parser(
+        "studio",
+        help="steer a run on a web page: a new one, or one that was interrupted or has ended",
+        description="Without RUN a new one is made, as by train; you are its user unless --user names another.",
+        formatter_class=argparse.RawTextHelpFormatter,
+    )
+    studio.add_argument("run", type=Path, nargs="?", metavar="RUN", help="run folder, to go on with or to look at")
+    studio.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine alone)")
+    studio.add_argument("--port", type=_port, default=8080, help="default: 8080")
+    studio.add_argument("--token", help="what the page asks for (default: none on this machine, else a random one)")
+    _add_new_run(studio)
+    _add_settings(studio, studio.add_argument_group("settings of a new run"), Config, "")
+
+
+def _add_new_run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--preset", default="default", help=f"{', '.join(PRESETS)} (default: default)")
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE", help="settings as TOML, for instance a run's config.toml"
+    )
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="run folder (default: runs/DATE-TIME)")
+    parser.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
 
 
 def _add_continuing(commands: Any) -> None:
@@ -155,6 +177,13 @@ def _items(text: str) -> list[str]:
 
 def _seeds(text: str) -> tuple[int, ...]:
     return tuple(int(word) for word in text.split(","))
+
+
+def _port(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= 65535:
+        raise argparse.ArgumentTypeError(f"must be from 1 to 65535, not {number}")
+    return number
 
 
 def _size(text: str) -> int:

@@ -7,9 +7,10 @@ Exit codes: 0 done; 1 the run failed, what it had is kept; 2 bad input, nothing 
 import argparse
 import json
 import os
+import secrets
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from jmorl.signals import Interrupted, StopSignals
 
 if TYPE_CHECKING:
     from jmorl.storage.continuing import Continued
+    from jmorl.studio.session import Session
 
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
@@ -144,8 +146,49 @@ def _follow(continued: "Continued", user: DecisionMaker | None, options: argpars
         console.print(where, soft_wrap=True, highlight=False)
 
 
-def _checked_config(options: argparse.Namespace) -> Config:
-    """The config of the options; every problem, that of the output folder included, in one ConfigError."""
+def _studio(options: argparse.Namespace) -> None:
+    try:
+        from jmorl.studio import server
+    except ModuleNotFoundError as error:
+        raise ConfigError([f"the studio needs {error.name}: pip install 'jmorl[studio]'"]) from error
+    from jmorl.studio.guard import is_loopback
+    from jmorl.studio.session import Session
+
+    server.check_address(options.host, options.port)
+    token = options.token or (None if is_loopback(options.host) else secrets.token_urlsafe())
+    session = Session()
+    with StopSignals() as stop:
+        try:
+            _open(session, options)
+            print(f"The studio is at {server.address(options.host, options.port, token)} (Ctrl-C ends it)", flush=True)
+            with stop.asking():
+                server.serve(session, options.host, options.port, token)
+        except Interrupted as error:
+            error.add_note(f"what the run has is kept; open it again with: jmorl studio {session.view.path}")
+            raise
+        finally:
+            session.close()
+
+
+def _open(session: "Session", options: argparse.Namespace) -> None:
+    """Go on with the run that is named, or begin a new one."""
+    import envs
+    from jmorl.storage.continuing import Continued
+    from jmorl.storage.run_folder import RunFolder
+    from jmorl.studio.view import PERSON
+
+    if options.run:
+        session.open(options.run)
+    else:
+        config = _checked_config(options, {"user": PERSON})
+        session.drive(Continued(RunFolder.create(options.out, config, envs.make(config.env), options.force), None))
+
+
+def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> Config:
+    """The config of the options, over defaults of a command's own.
+
+    Every problem, that of the output folder included, is in one ConfigError.
+    """
     from jmorl.storage.lock import FolderInUse
     from jmorl.storage.run_folder import check_free
 
@@ -157,7 +200,7 @@ def _checked_config(options: argparse.Namespace) -> Config:
     except FolderInUse as error:
         problems.append(f"out: {error}")
     try:
-        config = resolve(options.preset, options.config, _overrides(options))
+        config = resolve(options.preset, options.config, {**(defaults or {}), **_overrides(options)})
     except ConfigError as error:
         raise ConfigError(error.problems + problems) from None
     if problems:
@@ -286,6 +329,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "train": _train,
     "resume": _resume,
     "branch": _branch,
+    "studio": _studio,
     "show": _show,
     "evaluate": _evaluate,
     "play": _play,

@@ -20,8 +20,6 @@ from jmorl.decision.users import make_user
 from jmorl.learning.moppo import Learner
 from jmorl.learning.population import Population
 from jmorl.scoring import Scores, paper_scores, raw_scores
-from jmorl.search.archive import Archive
-from jmorl.search.bounds import lower_bounds, within
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.metrics import (
     FrontMetrics,
@@ -32,33 +30,23 @@ from jmorl.search.metrics import (
     utility_metrics,
 )
 from jmorl.search.policy import Policy, values_of
-from jmorl.search.prediction import Records, predict
-from jmorl.search.scaling import Scale, range_scale, search_scale
+from jmorl.search.prediction import Records
+from jmorl.search.scaling import range_scale
 from jmorl.search.selection import Task, select_tasks
-from jmorl.search.weights import simplex_grid, spread_weights
-from jmorl.units import RunningUnits, initial_units, measured_in
+from jmorl.search.weights import spread_weights
+from jmorl.steering import (
+    RunState,
+    bounds_after,
+    candidate_weights,
+    candidates,
+    members_within,
+    predictions,
+    reference_point,
+    scale_of_gains,
+)
+from jmorl.units import initial_units, measured_in
 
 REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor the middle dominate a gain
-
-
-@dataclass(frozen=True)
-class RunState:
-    """All that a run knows between two generations."""
-
-    buffer: PerformanceBuffer
-    records: Records
-    bounds: np.ndarray  # [M] -inf before the first choice
-    archive: Archive = Archive()
-    units: RunningUnits | None = None  # of the scores; None for raw ones, which have nothing to remember
-    reference_point: np.ndarray | None = None  # [M] of the reported hypervolume; None before the warm-up
-    choice: Policy | None = None  # what the decision maker chose last
-    silent_generations: int = 0  # still to go before the next question
-    generation: int = 0  # finished generations, the warm-up not counted
-    iterations: int = 0  # PPO iterations of every agent so far
-    evaluation_steps: int = 0
-    policies: int = 0  # evaluated so far: the id of the next one
-    questions: int = 0
-    policies_shown: int = 0
 
 
 @dataclass(frozen=True)
@@ -185,7 +173,7 @@ class _Run:
         self.environment = environment
         self.decision_maker = decision_maker
         self.population = population
-        self.candidate_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
+        self.candidate_weights = candidate_weights(config, len(environment.objectives))
         self.objectives = measured_in(config.evaluation.units, environment.objectives)
         self.initial_key, self.training_key, _ = _keys(config)
 
@@ -212,7 +200,7 @@ class _Run:
             state = finished.state
         satisfied = self._satisfied(state)
         # What satisfies may lie outside the bounds: the search is not the only one that finds things.
-        front = state.archive.members if satisfied else _within(state.archive.members, state.bounds)
+        front = state.archive.members if satisfied else members_within(state.archive.members, state.bounds)
         decided = self.ask(state, "final", front)
         yield decided
         yield RunFinished(_asked(state, decided), decided.chosen, "satisfied" if satisfied else "budget")
@@ -240,12 +228,12 @@ class _Run:
         """Select P tasks, train them, and take their offspring in."""
         state = replace(state, generation=state.generation + 1, silent_generations=max(state.silent_generations - 1, 0))
         started = time.perf_counter()
-        candidates = self._candidates(state)
-        tasks, predicted = self._select(state, candidates)
+        continued = candidates(state)
+        tasks, predicted = self._select(state, continued)
         lineage = Lineage(
-            [candidates[task.candidate] for task in tasks],
+            [continued[task.candidate] for task in tasks],
             predicted,
-            len(candidates),
+            len(continued),
             time.perf_counter() - started,
         )
         learners = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in lineage.parents))
@@ -261,7 +249,7 @@ class _Run:
         answer = self.decision_maker.answer(question)
         seconds = time.perf_counter() - started
         chosen = question.policy(answer.policy)
-        bounds = self._bounds(state, chosen) if purpose == "steer" else state.bounds
+        bounds = bounds_after(self.config, state, chosen) if purpose == "steer" else state.bounds
         return Decided(question, answer, chosen, bounds, seconds)
 
     def _steps(self, state: RunState) -> int:
@@ -274,29 +262,15 @@ class _Run:
     def _satisfied(self, state: RunState) -> bool:
         return self.decision_maker.satisfied(state.archive.values)
 
-    def _bounds(self, state: RunState, chosen: Policy) -> np.ndarray:
-        """The bounds that follow from a choice (the paper's equation 4)."""
-        values = state.archive.values
-        unit = np.ptp(values, axis=0) if self.config.search.bounds_scale == "range" else np.ones(values.shape[1])
-        return lower_bounds(chosen.values, self.config.search.delta, unit)
-
-    def _scale(self, state: RunState) -> Scale:
-        return search_scale(state.archive.values, state.bounds, _reference_point(state), self.config.search.value_scale)
-
-    def _candidates(self, state: RunState) -> list[Policy]:
-        """The policies whose training may be continued: the choice, always, and buffer members within the bounds."""
-        candidates = _within(state.buffer.members, state.bounds)
-        return candidates if state.choice is None or state.choice in candidates else [state.choice, *candidates]
-
-    def _select(self, state: RunState, candidates: list[Policy]) -> tuple[list[Task], np.ndarray]:
+    def _select(self, state: RunState, continued: list[Policy]) -> tuple[list[Task], np.ndarray]:
         """The tasks whose predicted offspring improve the front most, and the predictions [P, M] in raw units.
 
         In the interactive search only what lies within the bounds counts as an improvement.
         """
         search = self.config.search
-        scale = self._scale(state)
+        scale = scale_of_gains(self.config, state)
         bounded = state.choice is not None and search.gain_within == "bounds"
-        front = _within(state.archive.members, state.bounds) if bounded else state.archive.members
+        front = members_within(state.archive.members, state.bounds) if bounded else state.archive.members
         if bounded:
             reference = scale.apply(state.bounds)
         elif search.value_scale == "range":
@@ -304,7 +278,7 @@ class _Run:
         else:
             reference = np.zeros_like(state.bounds)  # the scale's origin is the reference point
         tasks = select_tasks(
-            scale.apply(self._predictions(state, candidates)),
+            scale.apply(predictions(self.config, state, continued)),
             scale.apply(values_of(front)),
             reference,
             self.config.population.agents,
@@ -312,16 +286,6 @@ class _Run:
             np.random.default_rng([self.config.seed, state.generation]),
         )
         return tasks, scale.invert(np.stack([task.predicted for task in tasks]))
-
-    def _predictions(self, state: RunState, candidates: list[Policy]) -> np.ndarray:
-        """What each candidate is expected to become with each of the weights, [C, W, M] in raw units.
-
-        The model's constants are for values scaled by range, whatever scale the gains are measured in.
-        """
-        scale = search_scale(state.archive.values, state.bounds, _reference_point(state), "range")
-        return scale.invert(
-            predict(scale.apply(values_of(candidates)), self.candidate_weights, state.records.scaled(scale))
-        )
 
     def _trained(
         self,
@@ -350,7 +314,7 @@ class _Run:
             seconds,
             iterations * self.config.steps_per_iteration / seconds.total,
             diagnostics.means(),
-            front_metrics(state.archive.values, _reference_point(state), self.candidate_weights),
+            front_metrics(state.archive.values, reference_point(state), self.candidate_weights),
             utility_metrics(self.decision_maker.utility, state.archive.members, state.buffer.members, state.bounds),
             prediction_metrics(lineage.parents if lineage else (), offspring, range_scale(state.archive.values)),
         )
@@ -378,7 +342,7 @@ class _Run:
             weights = np.stack([child.weights for child in offspring])
             records = state.records.add(values_of(lineage.parents), weights, values_of(offspring))
             state = replace(state, records=records)
-        return replace(state, buffer=state.buffer.offer(offspring, self._scale(state)))
+        return replace(state, buffer=state.buffer.offer(offspring, scale_of_gains(self.config, state)))
 
     def _first_reference_point(self, warmed_up: tuple[Policy, ...]) -> np.ndarray:
         if self.config.reference_point:
@@ -408,11 +372,6 @@ def _policies(
     )
 
 
-def _within(policies: Sequence[Policy], bounds: np.ndarray) -> list[Policy]:
-    inside = within(values_of(policies), bounds)
-    return [policy for policy, kept in zip(policies, inside, strict=True) if kept]
-
-
 def _asked(state: RunState, decided: Decided) -> RunState:
     """The state with a question counted and its choice noted."""
     return replace(
@@ -421,8 +380,3 @@ def _asked(state: RunState, decided: Decided) -> RunState:
         questions=state.questions + 1,
         policies_shown=state.policies_shown + len(decided.question.front),
     )
-
-
-def _reference_point(state: RunState) -> np.ndarray:
-    assert state.reference_point is not None, "the warm-up sets it"
-    return state.reference_point

@@ -20,17 +20,22 @@ MAY_IMPORT = {
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"envs", "jax", "jmorl.learning", "jmorl.storage", "jmorl.units"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},
+    "jmorl.steering": {"jmorl.config", "jmorl.search", "jmorl.units"},
     "jmorl.run": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),
-        "jmorl.units",
+        *("jmorl.steering", "jmorl.units"),
     },
     "jmorl.storage": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search"),
-        "jmorl.units",
+        *("jmorl.steering", "jmorl.units"),
     },
     "jmorl.report": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
-        *("jmorl.run", "jmorl.search", "jmorl.storage"),
+        *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage"),
+    },
+    "jmorl.studio": {
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.playback", "jmorl.report"),
+        *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage"),
     },
     "jmorl.paper": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.run"),

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from jmorl.config import Config
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, RunState
+from jmorl.run import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
+from jmorl.steering import RunState
 
 Phase = Literal["compiling", "warm-up", "generation", "question", "finished"]
 

@@ -1,14 +1,17 @@
-"""E-NAUTILUS on a finished run's front, with the dialogue kept in the run folder.
+"""E-NAUTILUS on a run's front, with the dialogue kept in the run folder.
 
 enautilus.jsonl  every question and answer of the last dialogue; `--user script=FILE` replays it
 enautilus.json   the policy it ended on; policies/ has its file
 """
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.protocol import DecisionMaker, PointAnswer, PointQuestion
-from jmorl.decision.records import point_record, to_json
+from jmorl.decision.records import PointRecord, point_record, to_json
 from jmorl.search.policy import Policy
-from jmorl.storage.files import write_json, written_whole
+from jmorl.storage.files import write_json, write_text
 from jmorl.storage.stored_run import StoredRun
 
 
@@ -17,16 +20,20 @@ def choose_afterwards(run: StoredRun, user: DecisionMaker, iterations: int, poin
 
     The dialogue replaces an earlier one only when it has come to its end.
     """
-    with written_whole(run.path / "enautilus.jsonl") as log:
+    records: list[PointRecord] = []
 
-        def asked(question: PointQuestion) -> PointAnswer:
-            answer = user.choose_point(question)
-            with log.open("a", encoding="utf-8") as file:
-                file.write(to_json(point_record(question, answer)) + "\n")
-            return answer
+    def asked(question: PointQuestion) -> PointAnswer:
+        answer = user.choose_point(question)
+        records.append(point_record(question, answer))
+        return answer
 
-        generation = int(run.metrics["generation"][-1])
-        chosen = run_enautilus(run.front, run.objectives, asked, iterations, points, generation)
-        log.touch()  # a front of one policy asks nothing
-    write_json(run.path / "enautilus.json", {"policy": chosen.id, "values": chosen.values.tolist()})
+    generation = int(run.metrics["generation"][-1])
+    chosen = run_enautilus(run.front, run.objectives, asked, iterations, points, generation)
+    keep_dialogue(run.path, records, chosen)
     return chosen
+
+
+def keep_dialogue(path: Path, records: Sequence[PointRecord], chosen: Policy) -> None:
+    """Write a dialogue that has come to its end into the run folder, in place of an earlier one."""
+    write_text(path / "enautilus.jsonl", "".join(to_json(record) + "\n" for record in records))
+    write_json(path / "enautilus.json", {"policy": chosen.id, "values": chosen.values.tolist()})

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from jmorl.run import RunState
+from jmorl.steering import RunState
 from jmorl.storage.files import partial_path, sync
 from jmorl.storage.packing import PackedState, pack
 from jmorl.storage.versions import check_format

@@ -13,8 +13,9 @@ from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
 from jmorl.learning.population import Population
-from jmorl.run import Event, RunState, run
+from jmorl.run import Event, run
 from jmorl.search.policy import Policy
+from jmorl.steering import RunState
 from jmorl.storage.checkpoints import (
     Checkpoint,
     DamagedCheckpoint,

@@ -16,11 +16,11 @@ import numpy as np
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.moppo import MOPPO
-from jmorl.run import RunState
 from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
+from jmorl.steering import RunState
 from jmorl.units import RunningUnits
 
 COUNTERS = tuple(field.name for field in fields(RunState) if field.type is int)

@@ -48,7 +48,7 @@ class StoredPolicy:
     def mean_action(self, observation: Any, xp: Any = np) -> Any:
         """The unclipped mean action; `xp` may be `jax.numpy` to trace it."""
         floor, limit = self.header["network"]["variance_floor"], self.header["network"]["clip"]
-        x = (observation - self.observation_mean) / np.sqrt(self.observation_variance + floor)
+        x = (observation - self.observation_mean) / xp.sqrt(self.observation_variance + floor)
         x = xp.clip(x, -limit, limit)
         for kernel, bias in self.layers[:-1]:
             x = xp.tanh(x @ kernel + bias)

@@ -10,13 +10,14 @@ from envs.core import Objective
 from jmorl.config import resolve
 from jmorl.decision.protocol import Answer, Question
 from jmorl.decision.records import decision_record
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished, RunState, Seconds
+from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished, Seconds
 from jmorl.search.bounds import lower_bounds
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.metrics import PredictionMetrics, UtilityMetrics, front_metrics
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Records
 from jmorl.search.weights import simplex_grid
+from jmorl.steering import RunState
 from jmorl.storage.stored_run import StoredRun
 
 OBJECTIVES = (

@@ -6,11 +6,11 @@ import pytest
 
 import envs
 from jmorl.learning.moppo import MOPPO
-from jmorl.run import RunState
 from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
+from jmorl.steering import RunState
 from jmorl.units import RunningUnits
 
 

@@ -6,8 +6,8 @@ import jax
 import numpy as np
 import pytest
 
-from jmorl.run import RunState
 from jmorl.search.archive import Archive
+from jmorl.steering import RunState
 from jmorl.storage.packing import PackingError, pack, unpack
 
 

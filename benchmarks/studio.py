@@ -1,0 +1,205 @@
+"""How the studio feels, and what it costs; in a real browser. `make bench-studio` prints it and keeps it.
+
+interaction   from a click on a policy to the page that shows it, with a front of 2,000 policies of three objectives
+question      from the click on a choice to the next question on MountainCar, less the generation's own time
+serving       how much longer the generations of a run take that a page is open on, than those of `jmorl train`
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.speed import machine
+from jmorl.config import resolve
+from jmorl.decision.protocol import Question
+from jmorl.search.policy import Policy
+from jmorl.steering import Prospect
+from jmorl.storage.stored_run import read_run
+from jmorl.studio.session import Session
+from jmorl.studio.view import Generation, View
+
+RESULTS = Path(__file__).parent / "studio.json"
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
+POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 3
+# Time in the browser, from a click on the n-th row in sight to the first picture that has the row and its card.
+CLICK = """(n) => new Promise((done) => {
+  const row = document.querySelectorAll(".policies-row")[n], started = performance.now();
+  const policy = row.children[1].textContent;
+  const look = () => {
+    const card = document.querySelector(".place.focus .card-title")?.textContent;
+    const focused = document.querySelector(".policies-row.focus")?.children[1].textContent;
+    if (card === `policy ${policy}` && focused === policy)
+      requestAnimationFrame(() => setTimeout(() => done(performance.now() - started)));
+    else requestAnimationFrame(look);
+  };
+  row.click();
+  look();
+})"""
+
+
+class Still(Session):
+    """A session at a question about many policies, of a run that there is not."""
+
+    def __init__(self, policies: int, objectives: int):
+        super().__init__()
+        config = resolve(overrides={"env": "mo-halfcheetah-v5", "user": "terminal"})
+        names = tuple(
+            replace(config_objective, name=f"o{index}", label=f"objective {index + 1}")
+            for index, config_objective in enumerate([_objective()] * objectives)
+        )
+        generator = np.random.default_rng(0)
+        directions = np.abs(generator.normal(size=(policies, objectives)))
+        values = 1000 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        front = tuple(_policy(number, each) for number, each in enumerate(values))
+        bounds = np.full(objectives, 150.0)
+        question = Question("steer", 4, names, front, bounds, 0)
+        generations = tuple(
+            Generation(number, values[:: 4 - number] * (0.7 + 0.1 * number), 1e6 * number, 1e8 * (1 + number), None)
+            for number in range(4)
+        )
+        self.view = View(
+            Path("synthetic"), "synthetic", config, names, generations, front, bounds, front[0], (), None,
+            question=question,
+        )  # fmt: skip
+
+    def _think(self, question: Question | None, policy: int) -> None:
+        values = self.view.values
+        bounds = values[policy] - 100
+        expected = values[policy] + np.random.default_rng(policy).normal(size=(40, values.shape[1])) * 50
+        prospect = Prospect(bounds, (values >= bounds).all(axis=1), expected)
+        self._rearrange(lambda desk: replace(desk, prospects={**desk.prospects, policy: prospect}))
+
+    def history(self) -> tuple[()]:
+        return ()
+
+
+def _objective() -> Any:
+    from envs.core import Objective
+
+    return Objective("o", "objective", "units")
+
+
+def _policy(number: int, values: np.ndarray) -> Policy:
+    weights = np.full(len(values), 1 / len(values))
+    return Policy(number, number % 4, None, weights, values, np.full(len(values), 5.0), values, None)
+
+
+@contextmanager
+def served(*command: str) -> Iterator[None]:
+    """A server in a process of its own, on PORT."""
+    process = subprocess.Popen([sys.executable, "-m", *command], stdout=subprocess.DEVNULL)
+    try:
+        while True:
+            try:
+                httpx.get(f"http://127.0.0.1:{PORT}")
+                break
+            except httpx.TransportError:
+                assert process.poll() is None, "the server has ended"
+                time.sleep(0.1)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextmanager
+def browser_page() -> Iterator[Page]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(f"http://127.0.0.1:{PORT}")
+        yield page
+        browser.close()
+
+
+def interaction() -> list[float]:
+    """Milliseconds from a click to what it shows, for clicks on several policies."""
+    with served("benchmarks.studio", "still"), browser_page() as page:
+        page.wait_for_selector(".policies-row")
+        page.wait_for_timeout(2000)
+        return [float(page.evaluate(CLICK, number % 9)) for number in range(CLICKS)]
+
+
+def question(folder: Path) -> list[float]:
+    """Seconds between a choice and the next question that were not the generation's own."""
+    waited, started = [], 0.0
+    run = str(folder / "question")
+    with served("jmorl.cli", "studio", "--out", run, "--port", str(PORT)), browser_page() as page:
+        for generation in range(1, 6):
+            page.get_by_text(f"Generation {generation}: which of these").wait_for(timeout=300_000)
+            if generation > 1:
+                waited.append(time.perf_counter() - started)
+            page.locator(".policies-row").first.click()
+            choose = page.get_by_role("button", name="Choose A", exact=True)
+            choose.wait_for()
+            started = time.perf_counter()
+            choose.click()
+    own = read_run(folder / "question").metrics["total_seconds"][1:5]
+    return [float(each) for each in np.array(waited) - own[: len(waited)]]
+
+
+def serving(folder: Path) -> tuple[list[float], list[float]]:
+    """Seconds of all generations of a run with an artificial user: trained in the terminal, and with a page open."""
+    alone, watched = [], []
+    settings = ["--user", "A", "--steps", "1700000"]
+    for repeat in range(REPEATS):
+        path = folder / f"alone{repeat}"
+        command = [sys.executable, "-m", "jmorl.cli", "train", "--quiet", "--out", str(path), *settings]
+        subprocess.run(command, check=True)
+        alone.append(_generation_seconds(path))
+        path = folder / f"watched{repeat}"
+        with served("jmorl.cli", "studio", "--out", str(path), "--port", str(PORT), *settings), browser_page() as page:
+            page.get_by_text("The result is policy").wait_for(timeout=600_000)
+        watched.append(_generation_seconds(path))
+    return alone, watched
+
+
+def _generation_seconds(path: Path) -> float:
+    return float(read_run(path).metrics["total_seconds"][1:].sum())
+
+
+def main() -> None:
+    if sys.argv[1:] == ["still"]:
+        from jmorl.studio.server import serve
+
+        serve(Still(POLICIES, 3), "127.0.0.1", PORT, None)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        clicks, waits, (alone, watched) = interaction(), question(Path(folder)), serving(Path(folder))
+    results = {
+        "machine": machine(),
+        "interaction_milliseconds": {"median": statistics.median(clicks), "most": max(clicks)},
+        "question_seconds": {"median": statistics.median(waits), "most": max(waits)},
+        "serving": {"alone_seconds": alone, "watched_seconds": watched, "share": _share(alone, watched)},
+    }
+    RESULTS.write_text(json.dumps(results, indent=2) + "\n")
+    table = Table("what", "median", "most")
+    table.add_row(f"click, with {POLICIES} policies", f"{statistics.median(clicks):.0f} ms", f"{max(clicks):.0f} ms")
+    table.add_row(
+        "choice to next question, besides training", f"{statistics.median(waits):.2f} s", f"{max(waits):.2f} s"
+    )
+    table.add_row("training, with a page open", f"{100 * _share(alone, watched):+.1f} %", "")
+    Console().print(table)
+
+
+def _share(alone: list[float], watched: list[float]) -> float:
+    return statistics.median(watched) / statistics.median(alone) - 1
+
+
+if __name__ == "__main__":
+    main()

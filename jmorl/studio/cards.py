@@ -1,0 +1,92 @@
+"""The policies that are laid out: how they behave, what they score, what choosing them would mean."""
+
+from typing import TYPE_CHECKING
+
+from nicegui import ui
+from nicegui.element import Element
+
+from jmorl.search.policy import Policy
+from jmorl.studio import words
+from jmorl.studio.desk import LETTERS
+from jmorl.studio.looks import decimals
+
+if TYPE_CHECKING:
+    from jmorl.studio.page import Page
+
+
+class Player(Element, component="player.js"):
+    """A canvas that plays an episode, or the controls of all of them."""
+
+
+class Cards:
+    """As many places as there are letters; a policy stays in its place while it is laid out."""
+
+    def __init__(self, page: "Page"):
+        self.page = page
+        self.cards: dict[str, Card] = {}
+        with ui.element("section").classes("panel behaviour").props('aria-label="Behaviour"'):
+            controls = Player()
+            controls.props["controls"] = True
+            self.hint = ui.label("Click a policy in a chart or in the table to see what it does.").classes("hint")
+            with ui.element("div").classes("cards"):
+                self.places = {letter: ui.element("article").classes("place") for letter in LETTERS}
+
+    def show(self) -> None:
+        view, desk = self.page.view, self.page.desk
+        for letter, place in self.places.items():
+            policy = view.policy(desk.places[letter]) if letter in desk.places else None
+            card = self.cards.get(letter)
+            if card and (policy is None or (view.run, policy.id) != (card.run, card.policy.id)):
+                place.clear()
+                del self.cards[letter]
+            if policy and letter not in self.cards:
+                with place:
+                    self.cards[letter] = Card(self.page, policy, letter)
+            if policy:
+                self.cards[letter].show()
+            focused = policy is not None and policy.id == desk.focus
+            place.classes(add="focus" if focused else None, remove=None if focused else "focus")
+            place.set_visibility(policy is not None)
+        self.hint.set_visibility(not self.cards)
+
+
+class Card:
+    """One policy."""
+
+    def __init__(self, page: "Page", policy: Policy, letter: str):
+        self.page = page
+        self.policy = policy
+        self.letter = letter
+        view = page.view
+        self.run = view.run
+        with ui.element("div").classes("card-head"):
+            ui.label(letter).classes(f"letter mark-{letter}")
+            ui.label(f"policy {policy.id}").classes("card-title")
+            ui.button(icon="close", on_click=lambda: page.put_away(policy.id)).props(
+                f'flat dense round size=xs aria-label="put policy {policy.id} away"'
+            )
+        player = Player()
+        digits = decimals(view.values) if view.front else [2] * len(view.objectives)
+        player.props["src"] = f"/episodes/{view.run}/{policy.id}"
+        player.props["objectives"] = [f"{each.label} so far" for each in view.objectives]
+        player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]
+        player.props["label"] = f"policy {policy.id} at work"
+        with ui.element("dl").classes("scores"):
+            for score, objective in zip(words.score_of_each(view, policy), view.objectives, strict=True):
+                with ui.element("dt"):
+                    ui.label(objective.label)
+                with ui.element("dd"):
+                    ui.label(score)
+        self.consequences = ui.label().classes("consequences")
+        self.choose = ui.button(on_click=lambda: page.choose(policy.id)).props("no-caps dense").classes("choose")
+
+    def show(self) -> None:
+        """What depends on the question, and on the focus."""
+        view, desk = self.page.view, self.page.desk
+        focused = desk.focus == self.policy.id
+        prospect = desk.prospects.get(self.policy.id) if view.question else None
+        self.consequences.set_text(words.consequences(view, prospect, self.policy))
+        self.choose.set_visibility(view.choosable(self.policy.id))
+        final = view.question is not None and view.question.purpose == "final"
+        self.choose.set_text(f"{self.letter} is the result" if final else f"Choose {self.letter}")
+        self.choose.props(remove="outline" if focused else "", add="" if focused else "outline")

@@ -1,0 +1,60 @@
+"""A recorded episode as JSON for the player on the page.
+
+What does not move is said once; of what moves, every frame has its own shapes. Totals are those of every frame.
+"""
+
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from jmorl.playback import Recording
+from jmorl.report.playback import STEP_SECONDS
+
+LEAST_SECONDS = 1 / 30  # between two frames
+DIGITS = 4
+
+
+def episode_json(recording: Recording) -> dict[str, Any]:
+    """Frames no nearer than a thirtieth of a second, the last one included.
+
+        {"seconds": between two frames, "still": [shape, ...],
+         "frames": [{"step", "window", "shapes": [shape, ...], "totals": [M]}, ...]}
+
+    Raises NoDrawing if the environment has none.
+    """
+    seconds = recording.environment.step_seconds or STEP_SECONDS
+    stride = ceil(LEAST_SECONDS / seconds - 1e-9)
+    steps = [*range(0, recording.steps, stride), recording.steps]
+    scenes = [_rounded(recording.scene(step).to_json()) for step in steps]
+    still = _still(scenes)
+    frames = [
+        {
+            "step": step,
+            "window": scene["window"],
+            "shapes": scene["shapes"][still:],
+            "totals": _rounded(recording.totals[step].tolist()),
+        }
+        for step, scene in zip(steps, scenes, strict=True)
+    ]
+    return {"seconds": stride * seconds, "still": scenes[0]["shapes"][:still], "frames": frames}
+
+
+def _still(scenes: list[dict[str, Any]]) -> int:
+    """How many of the first shapes are the same in every scene: later ones are drawn over them."""
+    first = scenes[0]["shapes"]
+    for index, shape in enumerate(first):
+        if any(len(scene["shapes"]) <= index or scene["shapes"][index] != shape for scene in scenes):
+            return index
+    return len(first)
+
+
+def _rounded(content: Any) -> Any:
+    match content:
+        case dict():
+            return {name: _rounded(value) for name, value in content.items()}
+        case list() | tuple():
+            return [_rounded(value) for value in content]
+        case float() | np.floating():
+            return round(float(content), DIGITS)
+    return content

@@ -1,0 +1,234 @@
+"""The front as points: two of its objectives, what lies within the bounds, what was and what may be."""
+
+from typing import Any
+
+import numpy as np
+
+from envs.core import Objective
+from jmorl.decision.protocol import PointQuestion
+from jmorl.display.limits import around, core
+from jmorl.search.bounds import within
+from jmorl.studio.desk import Desk
+from jmorl.studio.looks import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    LETTER_COLOURS,
+    ORANGE,
+    PALE,
+    TEXT,
+    TOOLTIP_TEXT,
+    base,
+    better,
+    plain,
+)
+from jmorl.studio.view import View
+from jmorl.studio.words import wanted
+
+STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"
+GHOSTS = 6  # earlier fronts
+IN_FORCE = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
+PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
+MANY = 300  # policies; more are drawn smaller
+
+
+def front_options(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    """What stays while policies are looked at, with the objectives `axes` to the right and upwards."""
+    limits = _limits(view)
+    return {
+        **_frame(view, axes, limits, visible=True),
+        "series": [
+            _area("bounds", view.bounds, axes, limits, IN_FORCE),
+            _ghosts(view, axes),
+            _members(view, axes, inside=False),
+            _members(view, axes, inside=True),
+            _journey(view, axes),
+            _result(view, axes),
+        ],
+    }
+
+
+def front_marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
+    """What follows from what is laid out: a chart to put over the other, so that only little is drawn anew."""
+    limits = _limits(view)
+    bounds = desk.prospect.bounds if desk.prospect else np.full(len(view.objectives), -np.inf)
+    return {
+        **_frame(view, axes, limits, visible=False),
+        "series": [
+            _area("bounds that would follow", bounds, axes, limits, PROPOSED),
+            _expected(desk, axes),
+            _wanted(view, desk, axes),
+            _laid_out(view, desk, axes),
+            _points(asked, axes),
+        ],
+    }
+
+
+def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
+    """Where both charts have their axes."""
+    x, y = (
+        _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
+    )
+    grid = {"left": 62, "right": 18, "top": 14, "bottom": 44}
+    return {**base(), "grid": grid, "xAxis": x, "yAxis": y}
+
+
+def _limits(view: View) -> np.ndarray:
+    """Of the axes, [2, M]: around the front without what is far out, and around bounds and choices."""
+    if not view.front:
+        return np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
+    shown = [
+        view.values[core(view.values)],
+        *(choice.values[None] for choice in (view.previous, view.result) if choice),
+    ]
+    if np.isfinite(view.bounds).all():
+        shown.append(view.bounds[None])
+    return around(np.concatenate(shown))
+
+
+def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> dict[str, Any]:
+    low, high = limits.tolist()
+    return {
+        "type": "value",
+        "show": visible,
+        "name": better(objective),
+        "nameLocation": "middle",
+        "nameGap": gap,
+        "nameTextStyle": TEXT,
+        "min": low,
+        "max": high,
+        "axisLabel": {**TEXT, "showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
+        "axisLine": {"onZero": False, "lineStyle": {"color": GREY}},
+        "splitLine": {"lineStyle": {"color": "#ececec"}},
+        "splitNumber": 5,
+    }
+
+
+def _scatter(name: str, data: list[Any], axes: tuple[int, int], **looks: Any) -> dict[str, Any]:
+    """Points [policy, values..., note]; only those that are not silent answer the mouse."""
+    return {
+        "type": "scatter",
+        "id": name,
+        "name": name,
+        "data": data,
+        "encode": {"x": axes[0] + 1, "y": axes[1] + 1},
+        **looks,
+    }
+
+
+def _members(view: View, axes: tuple[int, int], inside: bool) -> dict[str, Any]:
+    """Members of the front within the bounds, or those outside them; pale if they cannot be chosen."""
+    kept = within(view.values, view.bounds) == inside
+    data = [
+        [policy.id, *values, "" if inside else "outside the bounds"]
+        for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
+        if shown
+    ]
+    open_to_choice = inside or view.question is None or view.question.purpose == "steer"
+    look = {"color": BLUE} if inside else {"color": "#ffffff", "borderWidth": 1.5}
+    border = {"borderColor": "#ffffff"} if inside else {"borderColor": BLUE if open_to_choice else PALE}
+    names = ["policy", *(f"{each.label} ({each.unit})" for each in view.objectives), "note"]
+    return _scatter(
+        "within the bounds" if inside else "outside the bounds",
+        data,
+        axes,
+        dimensions=names,
+        tooltip={":formatter": TOOLTIP_TEXT},
+        symbolSize=(9 if inside else 7) if len(view.front) <= MANY else 5,
+        itemStyle={**look, **border},
+        emphasis={"scale": 1.6},
+        z=4 if inside else 3,
+    )
+
+
+def _ghosts(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    earlier = view.generations[:-1][-GHOSTS:]
+    data = [[0, *values, ""] for generation in earlier for values in plain(generation.front)]
+    return _scatter("earlier fronts", data, axes, silent=True, symbolSize=4, itemStyle={"color": PALE}, z=1)
+
+
+def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    """The choices so far, each with the generation it was made for."""
+    data = [
+        {"value": [0, *plain(values)[0], ""], "label": {"formatter": str(generation)}}
+        for generation, values in view.choices
+    ]
+    return {
+        **_scatter("choices", data, axes, silent=True, symbolSize=15, z=5),
+        "type": "line",
+        "symbol": "circle",
+        "showAllSymbol": True,
+        "itemStyle": {"color": "transparent", "borderColor": INK, "borderWidth": 1.5},
+        "lineStyle": {"color": INK, "width": 1, "type": "dotted"},
+        "label": {"show": True, "position": "left", "fontSize": 10, "color": INK},
+        "labelLayout": {"hideOverlap": True},
+    }
+
+
+def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    data = [[view.result.id, *plain(view.result.values)[0], "the result"]] if view.result else []
+    looks = {"symbol": STAR, "symbolSize": 20, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
+    return _scatter("result", data, axes, silent=True, z=6, **looks)
+
+
+def _area(
+    name: str, bounds: np.ndarray, axes: tuple[int, int], limits: np.ndarray, look: dict[str, Any]
+) -> dict[str, Any]:
+    """All that is at least as good as the bounds, as far as the chart reaches; nothing without any."""
+    corners: list[dict[str, Any]] = []
+    low, high = limits[:, list(axes)].tolist()
+    if np.isfinite(bounds[list(axes)]).any():
+        x, y = np.clip(bounds[list(axes)], low, high).tolist()
+        corners = [{"coord": [x, y]}, {"coord": high}]
+    area = {"silent": True, "itemStyle": look, "data": [corners] if corners else []}
+    return {"type": "scatter", "id": name, "name": name, "data": [], "silent": True, "markArea": area}
+
+
+def _expected(desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
+    expected = desk.prospect.expected if desk.prospect else np.zeros((0, 0))
+    data = [[0, *values, ""] for values in plain(expected)] if len(expected) else []
+    looks = {"symbol": "path://M4 0h2v4h4v2h-4v4h-2v-4h-4v-2h4z", "symbolSize": 8, "itemStyle": {"color": GREEN}}
+    return _scatter("expected by the model", data, axes, silent=True, z=2, **looks)
+
+
+def _wanted(view: View, desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
+    """Rings around what has more of what there should be more of."""
+    more = set(wanted(view, desk) or ())
+    data = [[policy.id, *plain(policy.values)[0], ""] for policy in view.front if policy.id in more]
+    look = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
+    return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=look, z=6)
+
+
+def _laid_out(view: View, desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
+    data = []
+    for policy_id, letter in desk.letters.items():
+        policy = view.policy(policy_id)
+        if policy:
+            focused = policy_id == desk.focus
+            data.append(
+                {
+                    "value": [policy_id, *plain(policy.values)[0], ""],
+                    "label": {"formatter": letter},
+                    "symbolSize": 22 if focused else 17,
+                    "itemStyle": {"color": LETTER_COLOURS[letter], "borderColor": INK if focused else "#ffffff"},
+                }
+            )
+    label = {"show": True, "position": "inside", "color": "#ffffff", "fontWeight": "bold", "fontSize": 11}
+    return _scatter("laid out", data, axes, silent=True, label=label, z=7, itemStyle={"borderWidth": 1.5})
+
+
+def _points(asked: PointQuestion | None, axes: tuple[int, int]) -> dict[str, Any]:
+    """The points of E-NAUTILUS, and where one is."""
+    data: list[dict[str, Any]] = []
+    if asked:
+        label = {"formatter": "you", "position": "right"}
+        here = {"value": [0, *plain(asked.state.point)[0], ""], "symbol": "triangle", "label": label}
+        points = [
+            {"value": [0, *plain(point.value)[0], ""], "label": {"formatter": str(number)}}
+            for number, point in enumerate(asked.points, start=1)
+        ]
+        data = [here, *points]
+    text = {"show": True, "position": "inside", "fontSize": 10, "fontWeight": "bold", "color": INK}
+    looks = {"symbol": "diamond", "symbolSize": 24, "itemStyle": {"color": ORANGE, "borderColor": INK}}
+    return _scatter("points of E-NAUTILUS", data, axes, silent=True, label=text, z=8, **looks)

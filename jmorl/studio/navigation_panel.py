@@ -1,0 +1,136 @@
+"""E-NAUTILUS on the page: from the worst corner of the front to one of its policies, choice by choice."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from nicegui import run, ui
+
+from jmorl.decision.enautilus import IntermediatePoint
+from jmorl.decision.protocol import Adjust, Back, Choose, PointAnswer, PointQuestion
+from jmorl.display.text import objective_label, plural
+from jmorl.search.scaling import range_scale
+from jmorl.studio import words
+from jmorl.studio.dialogue import Dialogue
+
+if TYPE_CHECKING:
+    from jmorl.studio.page import Page
+
+ITERATIONS, POINTS = 3, 3
+
+
+class NavigationPanel:
+    """The dialogue as the session has it, or the way into one."""
+
+    def __init__(self, page: "Page"):
+        self.page = page
+        self.body = ui.element("div").classes("navigation")
+
+    def show(self) -> None:
+        self.body.clear()
+        dialogue = self.page.dialogue
+        with self.body:
+            if dialogue is None:
+                self._add_beginning()
+            elif dialogue.chosen:
+                self._add_end(dialogue)
+            else:
+                self._add_question(dialogue, dialogue.question)
+
+    def _add_beginning(self) -> None:
+        ui.label(
+            "E-NAUTILUS leads you from the worst value of every objective to one policy of the front, in a few choices "
+            "among points each of which is better in everything than where you are: nothing has to be given up."
+        ).classes("explanation")
+        with ui.element("div").classes("controls"):
+            iterations = _number("iterations", ITERATIONS)
+            points = _number("points in each", POINTS)
+            begin = ui.button("Begin", on_click=lambda: self._begin(iterations, points))
+            begin.props("no-caps dense color=primary")
+
+    def _add_question(self, dialogue: Dialogue, question: PointQuestion) -> None:
+        state = question.state
+        ui.label(
+            f"On the front after generation {question.generation}: {int(state.reachable.sum())} of "
+            f"{plural(len(question.front), 'policy')} reachable. Which point do you prefer?"
+        ).classes("explanation")
+        for number, point in enumerate(question.points, start=1):
+            self._add_point(dialogue, question, number, point)
+        with ui.element("div").classes("controls"):
+            iterations = _number("iterations left", state.iterations_left)
+            points = _number("points in each", state.points)
+            change = ui.button("Change", on_click=lambda: self._adjust(dialogue, iterations, points))
+            change.props("no-caps dense outline")
+            back = ui.button("Step back", on_click=lambda: self._reply(dialogue, Back(1)))
+            back.props("no-caps dense outline")
+            back.set_enabled(state.choices > 0)
+            ui.button("Close", on_click=self._close).props("no-caps dense flat")
+
+    def _add_point(self, dialogue: Dialogue, question: PointQuestion, number: int, point: IntermediatePoint) -> None:
+        scale, formats = range_scale(question.state.values), words.formats_of(self.page.view)
+        worst, best = scale.apply(point.value), scale.apply(point.best)
+        with ui.element("div").classes("point"):
+            ui.label(str(number)).classes("point-number")
+            with ui.element("div").classes("point-ranges"):
+                for index, objective in enumerate(question.objectives):
+                    fmt = formats[index]
+                    ui.label(objective_label(objective)).classes("point-objective")
+                    with ui.element("div").classes("range").props('aria-hidden="true"'):
+                        width = max(100 * (best[index] - worst[index]), 1.5)
+                        ui.element("div").style(f"left: {100 * worst[index]:.1f}%; width: {width:.1f}%")
+                    ui.label(words.minus(f"{point.value[index]:{fmt}} to {point.best[index]:{fmt}}"))
+            with ui.element("div").classes("point-side"):
+                ui.label(f"{point.closeness:.0f} % of the way")
+                ui.label(f"{plural(int(point.reachable.sum()), 'policy')} left")
+            choose = ui.button("Prefer", on_click=lambda: self._reply(dialogue, Choose(number - 1)))
+            choose.props("no-caps dense outline")
+
+    def _add_end(self, dialogue: Dialogue) -> None:
+        chosen = dialogue.chosen
+        assert chosen
+        ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {words.scores(self.page.view, chosen)}.").classes("ending")
+        if self.page.view.choosable(chosen.id):
+            ui.label("It is laid out below, where you can choose it.").classes("explanation")
+        with ui.element("div").classes("controls"):
+            look = ui.button("Look at it", on_click=lambda: self.page.look_at(chosen.id))
+            look.props("no-caps dense color=primary")
+            undo = ui.button("Step back", on_click=self._undo).props("no-caps dense outline")
+            undo.set_enabled(dialogue.before is not None)
+            ui.button("Begin again", on_click=self._close).props("no-caps dense flat")
+
+    async def _begin(self, iterations: ui.number, points: ui.number) -> None:
+        await self._try(self.page.session.begin_dialogue, _whole(iterations), _whole(points))
+
+    async def _adjust(self, dialogue: Dialogue, iterations: ui.number, points: ui.number) -> None:
+        await self._reply(dialogue, Adjust(_whole(iterations), _whole(points)))
+
+    async def _reply(self, dialogue: Dialogue, answer: PointAnswer) -> None:
+        await self._try(self.page.session.reply, dialogue, answer)
+
+    def _undo(self) -> None:
+        self.page.session.undo_reply()
+        self.page.refresh()
+
+    def _close(self) -> None:
+        self.page.session.close_dialogue()
+        self.page.refresh()
+
+    async def _try(self, command: Callable[..., object], *arguments: object) -> None:
+        """Clustering a large front takes a moment, in which the page goes on."""
+        with self.page.root:  # what was pressed may be gone then
+            try:
+                if await run.io_bound(command, *arguments) is False:
+                    ui.notify("The dialogue has moved on in another tab; nothing has changed.", type="warning")
+            except ValueError as error:
+                ui.notify(str(error), type="negative")
+        self.page.refresh()
+
+
+def _number(label: str, value: int) -> ui.number:
+    ui.label(label)
+    number = ui.number(value=value, min=1, max=20, format="%d")
+    number.props(f'dense outlined aria-label="{label}"').classes("count")
+    return number
+
+
+def _whole(number: ui.number) -> int:
+    return int(number.value or 0)

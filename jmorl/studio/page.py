@@ -1,0 +1,202 @@
+"""The page: its parts, and what brings them up to date.
+
+All that is shown comes from the session's records; a tab keeps nothing of its own but which objectives its chart has.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from nicegui import run, ui
+from nicegui.events import KeyEventArguments
+
+from jmorl.decision.protocol import Answer, Question
+from jmorl.display.text import objective_label
+from jmorl.studio import words
+from jmorl.studio.cards import Cards
+from jmorl.studio.charts import Charts
+from jmorl.studio.history_panel import HistoryPanel
+from jmorl.studio.looks import BLUE, RED
+from jmorl.studio.navigation_panel import NavigationPanel
+from jmorl.studio.policies import PolicyTable
+from jmorl.studio.question_bar import QuestionBar
+from jmorl.studio.session import Session
+
+REFRESH_SECONDS, TICK_SECONDS = 0.1, 0.5
+STYLE = Path(__file__).parent / "studio.css"
+
+
+class Page:
+    """One tab."""
+
+    def __init__(self, session: Session):
+        self.session = session
+        self.view, self.desk, self.dialogue = session.view, session.desk, session.dialogue
+        ui.add_css(STYLE)
+        ui.colors(primary=BLUE, negative=RED)
+        with ui.element("main").classes("studio") as self.root:
+            self._add_header()
+            self.question_bar = QuestionBar(self)
+            with ui.element("div").classes("charts"):
+                self.charts = Charts(self)
+            with ui.element("div").classes("side"):
+                self._add_tabs()
+                self.cards = Cards(self)
+        self._add_keys()
+        self._show_all()
+        ui.timer(REFRESH_SECONDS, self.refresh)
+
+    def refresh(self) -> None:
+        """Bring up to date what is not."""
+        view, desk, dialogue = self.session.view, self.session.desk, self.session.dialogue
+        other_run = view.path != self.view.path
+        new_view, new_desk, new_dialogue = view is not self.view, desk is not self.desk, dialogue is not self.dialogue
+        self.view, self.desk, self.dialogue = view, desk, dialogue
+        if other_run:
+            self._show_all()
+            return
+        if new_view:
+            self.charts.show()
+            self.table.show()
+            self.history.show()
+        elif new_desk or new_dialogue:
+            self.charts.show_marks()
+        if new_view or new_desk:
+            self.question_bar.show()
+            self.table.show_marks()
+            self.cards.show()
+        if new_view or new_dialogue:
+            self.navigation.show()
+        if new_view or self.session.clock() >= self.next_tick:
+            self._tick()
+
+    def choose(self, policy: int, stop: bool = False) -> None:
+        """Answer the open question as this tab shows it."""
+        question = self.view.question
+        if question is None:
+            ui.notify("No question is open: it is already answered, or still to come.", type="warning")
+        elif not self.view.choosable(policy):
+            ui.notify(f"Policy {policy} is not among those you can choose from.")
+        else:
+            self._answer(question, Answer(policy, stop, 1 if stop else self.question_bar.generations))
+
+    def look_at(self, policy: int) -> None:
+        self.session.look_at(policy)
+        self.refresh()
+
+    def put_away(self, policy: int) -> None:
+        self.session.put_away(policy)
+        self.refresh()
+
+    def more_of(self, objective: int) -> None:
+        """More of an objective, or, asked for again, all policies."""
+        self.session.more_of(None if self.desk.more_of == objective else objective)
+        self.refresh()
+
+    async def step_back(self, run_id: str, generation: int) -> None:
+        """Ask an earlier question again, in a branch."""
+        await self._wait_for("Stepping back", self.session.step_back, run_id, generation)
+
+    async def switch(self, run_id: str) -> None:
+        """Open another branch, or go on with the one that is open."""
+        await self._wait_for("Opening", self.session.switch, run_id)
+
+    async def _wait_for(self, doing: str, command: Callable[..., None], *arguments: str | int) -> None:
+        with self.root:  # what was pressed may be gone when this is over
+            training = self.view.timeline and not self.view.question
+            ui.notify(f"{doing} after this generation …" if training else f"{doing} …")
+            try:
+                await run.io_bound(command, *arguments)
+            except ValueError as error:
+                ui.notify(str(error), type="negative", multi_line=True)
+        self.refresh()
+
+    def _answer(self, question: Question, answer: Answer) -> None:
+        if not self.session.answer(question, answer):
+            ui.notify("This question is already answered, in another tab; nothing has changed.", type="warning")
+
+    def _show_all(self) -> None:
+        for part in (self.question_bar, self.charts, self.table, self.history, self.navigation, self.cards):
+            part.show()
+        self.table.show_marks()
+        self._tick()
+
+    def _add_header(self) -> None:
+        with ui.element("header").classes("bar"):
+            ui.label("jmorl studio").classes("brand")
+            self.run_name = ui.label().classes("run-name")
+            self.phase = ui.label().classes("phase").props('role="status"')
+            with ui.element("div").classes("meter").props('role="progressbar" aria-label="Budget used"'):
+                self.meter = ui.element("div")
+            self.facts = ui.label().classes("facts")
+            ui.button("Keys", on_click=self._show_keys).props("flat dense no-caps size=sm")
+
+    def _add_tabs(self) -> None:
+        with ui.element("section").classes("panel tabs"):
+            with ui.tabs().props("dense no-caps align=left") as tabs:
+                names = ("Policies", "Progress", "History", "E-NAUTILUS")
+                for name in names:
+                    ui.tab(name)
+            # All stay mounted, so that none has to be filled anew when it is shown.
+            with ui.tab_panels(tabs, value="Policies", animated=False).props("keep-alive").classes("tab-panels"):
+                with ui.tab_panel("Policies"):
+                    self.table = PolicyTable(self)
+                with ui.tab_panel("Progress"):
+                    self.charts.add_curves()
+                with ui.tab_panel("History"):
+                    self.history = HistoryPanel(self)
+                with ui.tab_panel("E-NAUTILUS"):
+                    self.navigation = NavigationPanel(self)
+            self.tabs = tabs
+
+    def _tick(self) -> None:
+        """What changes with time alone."""
+        view, now = self.view, self.session.clock()
+        self.next_tick = now + TICK_SECONDS
+        self.run_name.set_text(f"{view.path.name} · {view.config.env}")
+        self.phase.set_text(words.phase(view, now, self.session.leaving))
+        self.facts.set_text(words.facts(view, now))
+        self.meter.style(f"width: {100 * words.share_done(view, now):.1f}%")
+
+    def _add_keys(self) -> None:
+        ui.keyboard(self._press, ignore=["input", "select", "textarea"], repeating=True)
+        with ui.dialog() as self.keys, ui.card():
+            ui.label("Keys").classes("title")
+            with ui.element("dl").classes("keys"):
+                for key, what in words.KEYS:
+                    with ui.element("dt"):
+                        ui.label(key)
+                    with ui.element("dd"):
+                        ui.label(what)
+            for number, objective in enumerate(self.view.objectives, start=1):
+                ui.label(f"{number}: {objective_label(objective)}")
+            ui.button("Close", on_click=self.keys.close).props("flat no-caps")
+
+    def _show_keys(self) -> None:
+        self.keys.open()
+
+    def _press(self, event: KeyEventArguments) -> None:
+        modified = event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta
+        if not event.action.keydown or modified or self.keys.value:
+            return
+        key, focus = event.key, self.desk.focus
+        if key.arrow_left or key.arrow_right:
+            self._look_along(1 if key.arrow_right else -1)
+        elif key.number and key.number <= len(self.view.objectives):
+            self.more_of(key.number - 1)
+        elif key == "?":
+            self._show_keys()
+        elif key == "c" and focus is not None:
+            self.choose(focus)
+        elif key == "x" and focus is not None:
+            self.put_away(focus)
+        elif key == "k":
+            self.question_bar.keep()
+
+    def _look_along(self, step: int) -> None:
+        """Look at the next policy of those shown, in the order of the first objective in the chart."""
+        wanted = words.wanted(self.view, self.desk)
+        shown = [policy for policy in self.view.front if wanted is None or policy.id in wanted]
+        order = [policy.id for policy in sorted(shown, key=lambda policy: float(policy.values[self.charts.axes[0]]))]
+        if order:
+            place = order.index(self.desk.focus) + step if self.desk.focus in order else 0
+            self.look_at(order[min(max(place, 0), len(order) - 1)])

@@ -1,0 +1,69 @@
+"""The table of policies on the page."""
+
+from typing import TYPE_CHECKING, Any
+
+from nicegui.element import Element
+
+from jmorl.display.text import objective_label
+from jmorl.search.bounds import within
+from jmorl.studio import words
+from jmorl.studio.looks import decimals, plain
+
+if TYPE_CHECKING:
+    from jmorl.studio.page import Page
+
+
+class Grid(Element, component="policy_table.js"):
+    """The rows and columns, in the browser."""
+
+
+class PolicyTable:
+    """The front as rows: id, values with their spread, generation."""
+
+    def __init__(self, page: "Page"):
+        self.page = page
+        self.by: int | None = None  # what there was more of when last shown
+        self.grid = Grid().classes("table")
+        self.grid.props["columns"] = self._columns()
+        self.grid.props["rows"] = []
+        self.grid.on("look", lambda event: page.look_at(int(event.args)))
+
+    def show(self) -> None:
+        """Send all rows."""
+        self.grid.props["columns"] = self._columns()
+        self.grid.props["rows"] = self._rows()
+        self.grid.update()
+
+    def show_marks(self) -> None:
+        """Send which rows are laid out, and which are left by what there should be more of."""
+        desk = self.page.desk
+        by = None if desk.more_of is None or desk.more_of == self.by else desk.more_of + 1
+        self.by = desk.more_of
+        self.grid.run_method("lay_out", desk.letters, desk.focus, words.wanted(self.page.view, desk), by)
+
+    def _columns(self) -> list[dict[str, Any]]:
+        view = self.page.view
+        count = len(view.objectives)
+        digits = decimals(view.values) if view.front else [2] * count
+        values = [
+            {
+                "label": objective.label,
+                "hint": f"{objective_label(objective)}, mean and standard deviation over the evaluation episodes",
+                "decimals": 2 if places is None else places,
+                "spread": index + count + 3,
+            }
+            for index, (objective, places) in enumerate(zip(view.objectives, digits, strict=True))
+        ]
+        return [
+            {"label": "policy", "hint": "number of the policy"},
+            *values,
+            {"label": "gen.", "hint": "generation it was born in; 0 is the warm-up"},
+        ]
+
+    def _rows(self) -> list[list[Any]]:
+        view = self.page.view
+        inside = within(view.values, view.bounds)
+        return [
+            [policy.id, not kept, *values, policy.generation, *plain(policy.spread)[0]]
+            for policy, kept, values in zip(view.front, inside.tolist(), plain(view.values), strict=True)
+        ]

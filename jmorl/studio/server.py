@@ -1,0 +1,105 @@
+"""The server of the studio: the page, and the files that it asks for."""
+
+import platform
+import socket
+import threading
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+import jax
+from fastapi import HTTPException
+from fastapi.responses import FileResponse, JSONResponse
+from nicegui import app, ui
+
+from envs.drawing import NoDrawing
+from jmorl.playback import record
+from jmorl.storage.policy_file import load_policy
+from jmorl.studio.episodes import episode_json
+from jmorl.studio.guard import Guard
+from jmorl.studio.page import Page
+from jmorl.studio.session import Session
+
+ICON = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="M2 3a11 11 0 0 1 11 11" fill="none" '
+    'stroke="#0072B2" stroke-width="2.5"/><circle cx="10" cy="6.5" r="2.6" fill="#E69F00"/></svg>'
+)
+KEPT = "private, max-age=86400"  # an episode never changes
+
+
+def check_address(host: str, port: int) -> None:
+    """Raise OSError, saying what to do, if nobody can listen there."""
+    try:
+        with socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET):
+            pass
+    except OSError as error:
+        raise OSError(f"cannot listen on {host}, port {port}: {error.strerror}; choose another --port") from error
+
+
+def address(host: str, port: int, token: str | None) -> str:
+    """What to open in a browser."""
+    name = platform.node() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port}/" + (f"?{urlencode({'token': token})}" if token else "")
+
+
+def serve(session: Session, host: str, port: int, token: str | None) -> None:
+    """Serve the page, in a thread of its own, until something is raised here: signals are for the caller to hear."""
+    app.add_middleware(Guard, host=host, token=token)
+    _add_files(session)
+
+    @ui.page("/")
+    def page() -> None:
+        Page(session)
+
+    serving = threading.Thread(target=_run, args=(host, port), name="server", daemon=True)
+    serving.start()
+    try:
+        serving.join()
+    finally:
+        if app.is_started:
+            app.shutdown()
+            serving.join()
+
+
+def _run(host: str, port: int) -> None:
+    ui.run(
+        host=host,
+        port=port,
+        title="jmorl studio",
+        favicon=ICON,
+        show=False,
+        reload=False,
+        tailwind=False,
+        show_welcome_message=False,
+        timeout_graceful_shutdown=1,
+    )
+
+
+def _add_files(session: Session) -> None:
+    """What the page asks for beside itself. Runs are named by their ids, policies by numbers: no path is taken."""
+
+    @app.get("/episodes/{run}/{policy}")
+    def episode(run: str, policy: int) -> JSONResponse:
+        try:
+            return JSONResponse(_episode(_file(session, run, policy)), headers={"cache-control": KEPT})
+        except NoDrawing as error:
+            raise HTTPException(404, str(error)) from error
+
+    @app.get("/policies/{run}/{policy}.npz")
+    def policy_file(run: str, policy: int) -> FileResponse:
+        path = _file(session, run, policy)
+        return FileResponse(path, media_type="application/octet-stream", filename=f"policy-{policy}.npz")
+
+
+def _file(session: Session, run: str, policy: int) -> Path:
+    path = session.policy_file(run, policy)
+    if path is None:
+        raise HTTPException(404, f"there is no policy {policy} in this run")
+    return path
+
+
+@lru_cache(maxsize=32)
+def _episode(path: Path) -> dict[str, Any]:
+    """The episode from the first of `jmorl evaluate`'s starts."""
+    return episode_json(record(load_policy(path), jax.random.split(jax.random.key(0), 1)[0]))

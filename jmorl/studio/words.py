@@ -1,0 +1,151 @@
+"""What the page says, as text."""
+
+import re
+
+import numpy as np
+
+from jmorl.display.text import duration, number_format, plural, short_count, values_in_words
+from jmorl.report.timeline import Timeline
+from jmorl.search.policy import Policy
+from jmorl.steering import Prospect
+from jmorl.studio.desk import Desk
+from jmorl.studio.view import PERSON, View
+
+KEYS = (
+    ("← →", "look at the next policy along the front"),
+    ("↑ ↓", "in the table: look at the next row"),
+    ("1 2 …", "more of objective 1, 2, …; once more: all policies"),
+    ("c", "choose the policy in focus"),
+    ("k", "keep the last choice"),
+    ("x", "put the policy in focus away"),
+    ("space", "stop and start the playback"),
+    ("?", "these keys"),
+)
+
+
+def phase(view: View, now: float, leaving: bool = False) -> str:
+    """What is going on."""
+    timeline = view.timeline
+    if view.problem:
+        return f"Stopped: {view.problem}"
+    if view.result:
+        return f"Finished: {view.reason}"
+    if timeline is None:
+        after = f" after generation {view.generations[-1].number}" if view.generations else ""
+        return f"Nothing is running; this run was left{after}"
+    if leaving:
+        return "Stopping after this generation"
+    if view.question:
+        return "Waiting for your answer"
+    elapsed = duration(now - timeline.since)
+    match timeline.phase:
+        case "compiling":
+            return f"Compiling the programs, {elapsed}"
+        case "warm-up":
+            return f"Warm-up: training {plural(view.config.population.agents, 'new agent')}, {elapsed}"
+        case "generation":
+            return f"Training generation {timeline.generation}"
+    return "Thinking"
+
+
+def facts(view: View, now: float) -> str:
+    """How far the run is, and how fast; empty for a run that does not go on."""
+    timeline = view.timeline
+    if timeline is None:
+        return ""
+    done = [f"generation {_generation(timeline)} of {timeline.generations}"]
+    done.append(f"{short_count(timeline.steps(now))} of {short_count(timeline.total_steps)} steps")
+    if timeline.finished:
+        done.append(f"{short_count(timeline.finished.steps_per_second)} steps/s")
+    seconds = timeline.seconds_to_question(now)
+    if seconds is not None and not view.question:
+        done.append(f"next question in {duration(seconds)}")
+    return "  ·  ".join(done)
+
+
+def share_done(view: View, now: float) -> float:
+    """Of the budget of steps, from 0 to 1."""
+    timeline = view.timeline
+    return timeline.steps(now) / timeline.total_steps if timeline else float(view.result is not None)
+
+
+def heading(view: View, desk: Desk) -> str:
+    """What is asked, or what there is to see."""
+    question, more = view.question, wanted(view, desk)
+    if more is not None and desk.more_of is not None and desk.than is not None:
+        label = view.objectives[desk.more_of].label
+        return f"{plural(len(more), 'policy')} with more {label} than policy {desk.than}"
+    if question:
+        policies = plural(len(question.front), "policy")
+        if question.purpose == "final":
+            return f"The run is over. Which of these {policies} is its result?"
+        return f"Generation {question.generation}: which of these {policies} do you prefer?"
+    if view.result:
+        return f"The result is policy {view.result.id}: {scores(view, view.result)}"
+    if view.timeline is None:
+        return "Look around, step back in the history, or go on with this run."
+    if not view.generations:
+        return "What there is to see comes with the end of the warm-up."
+    if view.config.user != PERSON:
+        return f"User {view.config.user} decides; you watch."
+    if view.config.method != "interactive":
+        return "You are asked once, at the end."
+    if view.timeline.silent > 1:
+        return f"You are asked again in {view.timeline.silent} generations."
+    return "You are asked when this generation is over."
+
+
+def scores(view: View, policy: Policy) -> str:
+    """All scores of a policy in one line."""
+    each = zip(view.objectives, score_of_each(view, policy), strict=True)
+    return ", ".join(f"{objective.label} {score}" for objective, score in each)
+
+
+def formats_of(view: View) -> list[str]:
+    """One for each objective, fit for the front; without one, of the policy that there is."""
+    values = view.values if view.front else np.zeros((1, len(view.objectives)))
+    return [number_format(column) for column in values.T]
+
+
+def score_of_each(view: View, policy: Policy) -> list[str]:
+    """`−66.1 ±0.4 -steps` for each objective: raw units, with their spread over the evaluation episodes."""
+    each = zip(view.objectives, policy.values, policy.spread, formats_of(view), strict=True)
+    return [minus(f"{value:{fmt}} ±{spread:{fmt}}") + f" {o.unit}" for o, value, spread, fmt in each]
+
+
+def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
+    """What choosing a policy would mean: what it rules out, and what the prediction model expects of what is left."""
+    question = view.question
+    if question is None or question.purpose != "steer":
+        return f"born in generation {policy.generation}"
+    if not view.choosable(policy.id):
+        return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
+    if prospect is None:
+        return "Working out what choosing it would mean …"
+    formats = formats_of(view)
+    count = int((~prospect.kept).sum())
+    bounds = minus(values_in_words(prospect.bounds, view.objectives, formats, "≥ "))
+    ruled_out = f"Rules out {count} of {plural(len(prospect.kept), 'policy')}: {bounds}."
+    if not len(prospect.expected):
+        return f"{ruled_out} The model expects nothing new within these bounds."
+    best = minus(values_in_words(prospect.expected.max(axis=0), view.objectives, formats))
+    return f"{ruled_out} The model expects up to {best}."
+
+
+def wanted(view: View, desk: Desk) -> list[int] | None:
+    """The policies that have more of what there should be more of, the least change first; None for all."""
+    if desk.more_of is None:
+        return None
+    reference = view.policy(desk.than) if desk.than is not None else None
+    least = reference.values[desk.more_of] if reference else -np.inf
+    members = sorted(view.front, key=lambda policy: float(policy.values[desk.more_of]))
+    return [policy.id for policy in members if policy.values[desk.more_of] > least]
+
+
+def minus(text: str) -> str:
+    """Numbers with the sign for minus that is as wide as a digit."""
+    return re.sub(r"(?<!\w)-(?=\d)", "−", text)
+
+
+def _generation(timeline: Timeline) -> int:
+    return min(timeline.generation, timeline.generations)

@@ -1,0 +1,100 @@
+"""A tab of a real browser, and what a person does in it."""
+
+import os
+from contextlib import contextmanager
+from pathlib import Path
+
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = (
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync"),
+)
+PATIENCE = 400_000  # milliseconds
+
+
+@contextmanager
+def chromium():
+    """Debian's browser, without a window."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+class Tab:
+    """One tab on the studio. What goes wrong in it, or leaves this machine, is noted."""
+
+    def __init__(self, browser, address):
+        self.page = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="no-preference")
+        self.page.set_default_timeout(PATIENCE)
+        self.problems = []
+        self.page.on("pageerror", lambda error: self.problems.append(str(error)))
+        self.page.on("request", self._note_request)
+        self.address = address
+        self.page.goto(address)
+
+    def _note_request(self, request):
+        if not request.url.startswith((self.address, self.address.replace("http", "ws"), "data:", "blob:")):
+            self.problems.append(f"asked for {request.url}")
+
+    def asked(self, generation):
+        """Wait until the question before this generation is open."""
+        self.page.get_by_text(f"Generation {generation}: which of these").wait_for()
+
+    def final(self):
+        self.page.get_by_text("The run is over. Which of these").wait_for()
+
+    def rows(self):
+        return self.page.locator(".policies-row")
+
+    def look_at(self, row):
+        """Click a row of the table; the number of its policy, when its card is there."""
+        cell = self.rows().nth(row)
+        policy = int(cell.locator("span").nth(1).inner_text())
+        cell.click()
+        self.page.locator(".place.focus .card-title", has_text=f"policy {policy}").wait_for()
+        return policy
+
+    def card(self, policy):
+        return self.page.locator(".place", has=self.page.get_by_text(f"policy {policy}", exact=True))
+
+    def choose(self, row=0):
+        """Choose the policy of a row; its number."""
+        policy = self.look_at(row)
+        self.card(policy).get_by_role("button", name="Choose").click()
+        return policy
+
+    def tab(self, name):
+        self.page.get_by_role("tab", name=name).click()
+
+    def bounds(self):
+        """Of the shaded region in the chart: its corner in the objectives' units, or None."""
+        return self.page.evaluate(
+            """() => {
+              const area = chartOf(".front").getOption().series.find((each) => each.id === "bounds").markArea.data;
+              return area.length ? area[0][0].coord : null;
+              function chartOf(place) {
+                const id = document.querySelector(`${place} .nicegui-echart`).id;
+                return getElement(id.slice(1)).chart;
+              }
+            }"""
+        )
+
+    def pictures_differ(self, policy):
+        """Whether the canvas of a card moves."""
+        canvas = self.card(policy).locator("canvas")
+        first = canvas.evaluate("(canvas) => canvas.toDataURL()")
+        self.page.wait_for_function(
+            "([canvas, first]) => canvas.toDataURL() !== first", arg=[canvas.element_handle(), first]
+        )
+        return True
+
+    def screenshot(self, name):
+        """Keep a picture, if a place for pictures is named."""
+        place = os.environ.get("STUDIO_SCREENSHOTS")
+        if place:
+            self.page.wait_for_timeout(600)  # a ripple of the last click
+            self.page.mouse.move(1, 1)
+            self.page.screenshot(path=Path(place) / f"{name}.png")

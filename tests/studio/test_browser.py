@@ -1,0 +1,205 @@
+"""The studio in a real browser: a whole run on MountainCar, and what must not be lost, on a small one."""
+
+import json
+
+import numpy as np
+import pytest
+
+from jmorl.storage.policy_file import load_policy
+from jmorl.storage.stored_run import read_run
+from tests.registered import ThreeWays
+from tests.studio.browsing import Tab, chromium
+from tests.studio.serving import Served, free_port
+
+pytestmark = pytest.mark.studio
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def small(small_config, tmp_path_factory):
+    """The settings of a run of seconds: three generations of an environment that any process knows by its module."""
+    config = tmp_path_factory.mktemp("config") / "config.toml"
+    config.write_text(small_config.replace(env=f"tests.registered:{ThreeWays.id}").to_toml())
+    return "--config", config
+
+
+def decisions(path):
+    return [json.loads(line) for line in (path / "decisions.jsonl").read_text().splitlines()]
+
+
+def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path):
+    path = tmp_path / "first"
+    with Served("--out", path, "--steps", 624_000, "--population.iterations", 4) as studio:
+        tab = Tab(browser, studio.address)
+        tab.page.get_by_text("Warm-up: training 6 new agents").wait_for()
+        tab.screenshot("1-warm-up")
+        tab.asked(1)
+        assert tab.bounds() is None
+
+        # Two policies beside each other, at work; what choosing the one in focus would mean.
+        policies = [tab.look_at(0), tab.look_at(1)]
+        assert all(tab.pictures_differ(policy) for policy in policies)
+        tab.card(policies[1]).get_by_text("Rules out").wait_for()
+        tab.card(policies[1]).locator(".totals dd").first.wait_for()
+        tab.screenshot("2-question")
+        tab.card(policies[1]).get_by_role("button", name="Choose").click()
+        tab.page.get_by_text("Training generation 1").wait_for()
+        tab.screenshot("3-training")
+        tab.asked(2)
+        before = tab.bounds()
+        tab.page.get_by_role("button", name="fuel", exact=True).click()
+        tab.screenshot("4-more-of-fuel")
+        tab.page.get_by_role("button", name="fuel", exact=True).click()
+        tab.choose(0)
+        tab.asked(3)
+        after = tab.bounds()
+        assert before is not None and after is not None and before != after
+        tab.tab("Progress")
+        tab.screenshot("5-progress")
+
+        # Two generations back, and otherwise.
+        tab.tab("History")
+        first = decisions(path)
+        tab.page.get_by_role("button", name="Choose otherwise").first.click()
+        tab.asked(1)
+        assert tab.bounds() is None
+        tab.tab("Policies")
+        last = tab.rows().count() - 1
+        otherwise = tab.look_at(last)
+        tab.page.get_by_role("spinbutton", name="generations before the next question").fill("2")
+        tab.page.keyboard.press("Tab")
+        tab.card(otherwise).get_by_role("button", name="Choose").click()
+        tab.asked(3)
+        tab.tab("History")
+        tab.screenshot("6-history")
+        branch = tmp_path / "first-2"
+        assert [each["generation"] for each in decisions(branch)] == [1]
+        assert decisions(branch)[0]["policy"] != first[0]["policy"] and decisions(path) == first
+
+        # E-NAUTILUS to its end, one step taken back on the way.
+        tab.tab("E-NAUTILUS")
+        tab.page.get_by_role("button", name="Begin").click()
+        tab.page.get_by_role("button", name="Prefer").first.click()
+        tab.page.get_by_text("Which point do you prefer").wait_for()
+        tab.screenshot("7-enautilus")
+        tab.page.get_by_role("button", name="Step back").click()
+        for _ in range(3):
+            if tab.page.get_by_text("E-NAUTILUS ends on").count():
+                break
+            tab.page.get_by_role("button", name="Prefer").first.click()
+            tab.page.wait_for_timeout(500)
+        tab.page.get_by_text("E-NAUTILUS ends on").wait_for()
+        ended_on = json.loads((branch / "enautilus.json").read_text())["policy"]
+        assert tab.card(ended_on).is_visible()
+        tab.card(ended_on).get_by_role("button", name="Choose").click()
+
+        # To the end, and the policy as a file.
+        tab.asked(4)
+        tab.tab("Policies")
+        tab.choose(0)
+        tab.final()
+        tab.screenshot("8-final-question")
+        result = tab.look_at(0)
+        tab.card(result).get_by_role("button", name="is the result").click()
+        tab.page.get_by_text(f"The result is policy {result}").wait_for()
+        tab.screenshot("9-end")
+        with tab.page.expect_download() as download:
+            tab.page.get_by_role("button", name="Save the policy file").click()
+        saved = tmp_path / "saved.npz"
+        download.value.save_as(saved)
+        assert not tab.problems
+    policy = load_policy(saved)
+    stored = read_run(branch)
+    assert policy.header["id"] == result == stored.chosen.id
+    np.testing.assert_allclose(policy.header["values"], stored.chosen.values)
+    assert np.abs(policy([-0.5, 0.01])) <= 1
+    assert "go on" not in "".join(studio.log) and studio.process.returncode == 143
+
+
+def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, small, tmp_path):
+    path, port = tmp_path / "run", free_port()
+    with Served("--out", path, *small, port=port) as studio:
+        tab = Tab(browser, studio.address)
+        tab.asked(1)
+        policy = tab.look_at(1)
+        tab.page.reload()
+        tab.asked(1)
+        tab.card(policy).wait_for()  # what was laid out still is
+        shown = tab.rows().all_inner_texts()
+        studio.kill()
+        assert not (path / "decisions.jsonl").exists()
+    with Served(path, port=port) as studio:
+        tab.page.wait_for_timeout(1000)
+        tab.page.reload()
+        tab.asked(1)
+        assert tab.rows().all_inner_texts() == shown
+        chosen = tab.choose(0)
+        tab.asked(2)
+        studio.kill()
+    with Served(path, port=port) as studio:
+        again = Tab(browser, studio.address)  # a new tab, and the old one finds the server again by itself
+        again.asked(2)
+        tab.asked(2)
+        assert [(each["generation"], each["policy"]) for each in decisions(path)] == [(1, chosen)]
+        again.page.close()
+        tab.choose(0)
+        tab.asked(3)
+        assert len(decisions(path)) == 2
+
+
+def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, small, tmp_path):
+    path = tmp_path / "run"
+    with Served("--out", path, *small) as studio:
+        tabs = [Tab(browser, studio.address) for _ in range(2)]
+        for tab in tabs:
+            tab.asked(1)
+        policy = tabs[0].look_at(0)
+        tabs[1].card(policy).wait_for()  # both see the same
+        # Both clicks are on their way before either tab can know of the other's.
+        buttons = [tab.card(policy).get_by_role("button", name="Choose").element_handle() for tab in tabs]
+        for button in buttons:
+            button.evaluate("(button) => button.click()")
+        tabs[1].page.get_by_text("already answered").wait_for()
+        for tab in tabs:
+            tab.asked(2)
+        assert [each["generation"] for each in decisions(path)] == [1]
+
+
+def test_the_keyboard_is_enough(browser, small, tmp_path):
+    path = tmp_path / "run"
+    with Served("--out", path, *small) as studio:
+        tab = Tab(browser, studio.address)
+        tab.asked(1)
+        keys = tab.page.keyboard
+        keys.press("ArrowRight")
+        tab.page.locator(".place.focus").wait_for()
+        keys.press("ArrowRight")
+        tab.page.locator(".place").nth(1).wait_for()
+        keys.press("2")
+        tab.page.locator('[aria-pressed="true"]', has_text="east").wait_for()
+        keys.press("2")
+        keys.press("x")
+        tab.page.locator(".place.focus").wait_for()
+        keys.press("c")
+        tab.asked(2)
+        first = decisions(path)[0]["policy"]
+        keys.press("?")
+        tab.page.get_by_text("keep the last choice").wait_for()
+        keys.press("Escape")
+        tab.page.get_by_text("keep the last choice").wait_for(state="hidden")
+        keys.press("k")
+        tab.asked(3)
+        assert [each["policy"] for each in decisions(path)] == [first, first]
+        # To the button that stops the run, by the tabulator alone.
+        for _ in range(60):
+            keys.press("Tab")
+            if tab.page.evaluate("document.activeElement.textContent.trim()") == "Stop here":
+                break
+        keys.press("Enter")
+        tab.page.get_by_role("button", name="End the run").press("Enter")
+        tab.page.get_by_text("The result is policy").wait_for()

@@ -1,0 +1,190 @@
+"""What the charts and the sentences say, against a view made by hand."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from envs.core import Objective
+from jmorl.config import resolve
+from jmorl.decision.protocol import Question
+from jmorl.report.timeline import Timeline
+from jmorl.search.policy import Policy
+from jmorl.steering import Prospect
+from jmorl.studio import dialogue, words
+from jmorl.studio.curves import curve_options
+from jmorl.studio.desk import Desk
+from jmorl.studio.front_chart import front_marks, front_options
+from jmorl.studio.parallel_chart import parallel_marks, parallel_options
+from jmorl.studio.view import Generation, View
+
+VALUES = {4: (-80.0, -20.0), 9: (-70.0, -40.0), 2: (-60.0, -60.0), 5: (-90.0, -10.0)}
+
+
+def policy(number, values):
+    vectors = {name: np.array(values) for name in ("values", "discounted")}
+    return Policy(number, 1, None, np.array([0.5, 0.5]), spread=np.array([0.5, 2.0]), snapshot=None, **vectors)
+
+
+@pytest.fixture
+def view():
+    """Four policies, the bounds of a choice, and a question."""
+    front = tuple(policy(number, values) for number, values in VALUES.items())
+    objectives = (Objective("time", "time", "-steps"), Objective("fuel", "<b>fuel</b>", "-J"))
+    bounds = np.array([-82.0, -45.0])
+    before = Generation(0, np.array([[-99.0, -50.0]]), 1000, 3.5, None)
+    now = Generation(1, np.array(list(VALUES.values())), 2000, 4.5, None)
+    config = resolve()
+    question = Question("steer", 2, objectives, front, bounds, 4)
+    timeline = Timeline(config, since=0.0, phase="question", generation=2)
+    choices = ((1, front[0].values),)
+    return View(
+        *(Path("run"), "id", config, objectives, (before, now), front, bounds, front[0], choices, timeline),
+        question=question,
+    )
+
+
+def series(options):
+    return {each["name"]: each for each in options["series"]}
+
+
+def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(view):
+    shown = series(front_options(view, (1, 0)))
+    inside, outside = shown["within the bounds"], shown["outside the bounds"]
+    assert {point[0] for point in inside["data"]} == {4, 9} and {point[0] for point in outside["data"]} == {2, 5}
+    for point in (*inside["data"], *outside["data"]):
+        assert tuple(point[1:3]) == VALUES[point[0]]
+    assert inside["encode"] == {"x": 2, "y": 1}
+    options = front_options(view, (1, 0))
+    assert shown["bounds"]["markArea"]["data"] == [
+        [{"coord": [-45.0, -82.0]}, {"coord": [options["xAxis"]["max"], options["yAxis"]["max"]]}]
+    ]
+    assert shown["earlier fronts"]["data"] == [[0, -99.0, -50.0, ""]] and shown["earlier fronts"]["silent"]
+
+
+def test_axes_hold_the_front_the_bounds_and_the_choice(view):
+    options = front_options(replace(view, bounds=np.array([-200.0, -45.0])), (0, 1))
+    assert options["xAxis"]["min"] < -200 and options["xAxis"]["max"] > -60
+    assert options["yAxis"]["min"] < -60 and options["yAxis"]["max"] > -10
+    assert "time (-steps)" in options["xAxis"]["name"] and "better" in options["xAxis"]["name"]
+
+
+def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
+    asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
+    empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
+    for shown in (view, empty):
+        for options in (
+            front_options(shown, (0, 1)),
+            front_marks(shown, Desk().with_policy(9), (0, 1), asked),
+            parallel_options(shown),
+            parallel_marks(shown, Desk().with_policy(9)),
+            curve_options(shown),
+        ):
+            assert options["tooltip"]["renderMode"] == "richText"
+            assert all("renderMode" not in each.get("tooltip", {}) for each in options["series"])
+            json.dumps(options, allow_nan=False)
+
+
+def test_marks_lie_exactly_over_the_chart(view):
+    chart, marks = front_options(view, (1, 0)), front_marks(view, Desk().with_policy(9), (1, 0), None)
+    for axis in ("xAxis", "yAxis"):
+        assert [chart[axis][end] for end in ("min", "max")] == [marks[axis][end] for end in ("min", "max")]
+        assert chart[axis]["show"] and not marks[axis]["show"]
+    assert chart["grid"] == marks["grid"]
+    lines, marked = parallel_options(view), parallel_marks(view, Desk().with_policy(9))
+    for shown, hidden in zip(lines["parallelAxis"], marked["parallelAxis"], strict=True):
+        assert (shown["min"], shown["max"]) == (hidden["min"], hidden["max"]) and not hidden["name"]
+    assert all(lines["parallel"][side] == marked["parallel"][side] for side in ("left", "right", "top", "bottom"))
+
+
+def test_charts_have_the_same_series_whatever_there_is_to_see(view):
+    """The browser's chart merges what it is sent into what it has."""
+    asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
+    empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
+    for much, little in (
+        (front_options(view, (0, 1)), front_options(empty, (0, 1))),
+        (front_marks(view, Desk().with_policy(9), (0, 1), asked), front_marks(empty, Desk(), (0, 1), None)),
+        (parallel_options(view), parallel_options(empty)),
+        (curve_options(view), curve_options(empty)),
+    ):
+        assert [each["id"] for each in much["series"]] == [each["id"] for each in little["series"]]
+
+
+def test_what_has_left_the_front_says_that_it_cannot_be_chosen(view):
+    gone = policy(77, (-99.0, -99.0))
+    assert "cannot be chosen" in words.consequences(replace(view, previous=gone), None, gone)
+
+
+def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
+    expected = np.array([[-65.0, -30.0], [-75.0, -15.0]])
+    prospect = Prospect(np.array([-75.0, -42.0]), np.array([False, True, False, False]), expected)
+    desk = replace(Desk().with_policy(4).with_policy(9), prospects={9: prospect})
+    shown = series(front_marks(view, desk, (0, 1), None))
+    assert shown["bounds that would follow"]["markArea"]["data"][0][0] == {"coord": [-75.0, -42.0]}
+    assert [point[1:3] for point in shown["expected by the model"]["data"]] == expected.tolist()
+    assert [point["label"]["formatter"] for point in shown["laid out"]["data"]] == ["A", "B"]
+    unfocused = series(front_marks(view, replace(desk, focus=4), (0, 1), None))
+    assert (
+        not unfocused["bounds that would follow"]["markArea"]["data"] and not unfocused["expected by the model"]["data"]
+    )
+    text = words.consequences(view, prospect, view.front[1])
+    assert "Rules out 3 of 4 policies: time ≥ −75.0, <b>fuel</b> ≥ −42.0." in text
+    assert "expects up to time −65.0, <b>fuel</b> −15.0" in text
+
+
+def test_lines_across_the_axes_have_the_values_of_the_policies(view):
+    shown = series(parallel_options(view)) | series(parallel_marks(view, Desk().with_policy(2)))
+    assert {line[-1]: tuple(line[:-1]) for line in shown["within the bounds"]["data"]} == {
+        number: VALUES[number] for number in (4, 9)
+    }
+    assert shown["bounds"]["data"] == [[-82.0, -45.0]]
+    assert shown["laid out"]["data"][0]["value"] == [*VALUES[2], 2]
+
+
+def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
+    final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
+    borders = [
+        series(front_options(each, (0, 1)))["outside the bounds"]["itemStyle"]["borderColor"] for each in (view, final)
+    ]
+    assert borders == ["#0072B2", "#b8b8b8"]
+    assert final.choosable(4) and not final.choosable(2) and view.choosable(2)
+
+
+@pytest.mark.parametrize(("objective", "than", "expected"), [(0, 4, [9, 2]), (1, 4, [5]), (0, None, [5, 4, 9, 2])])
+def test_more_of_an_objective_lists_the_least_change_first(view, objective, than, expected):
+    desk = Desk(more_of=objective, than=than)
+    assert words.wanted(view, desk) == expected
+    rings = series(front_marks(view, desk, (0, 1), None))["more of an objective"]["data"]
+    assert {ring[0] for ring in rings} == set(expected)
+
+
+def test_with_nothing_wanted_there_is_no_ring(view):
+    assert words.wanted(view, Desk()) is None
+    assert not series(front_marks(view, Desk(), (0, 1), None))["more of an objective"]["data"]
+
+
+def test_the_heading_says_what_is_asked(view):
+    assert words.heading(view, Desk()) == "Generation 2: which of these 4 policies do you prefer?"
+    assert words.heading(view, Desk(more_of=0, than=4)) == "2 policies with more time than policy 4"
+    final = replace(view, question=replace(view.question, purpose="final"))
+    assert words.heading(final, Desk()) == "The run is over. Which of these 4 policies is its result?"
+    ended = replace(view, question=None, result=view.front[2], timeline=None)
+    assert words.heading(ended, Desk()) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({}, "Waiting for your answer"),
+        ({"question": None, "timeline": None}, "Nothing is running; this run was left after generation 1"),
+        ({"problem": "OSError: full"}, "Stopped: OSError: full"),
+    ],
+)
+def test_the_phase_says_what_is_waited_for(view, changes, text):
+    assert words.phase(replace(view, **changes), now=5.0) == text
+
+
+def test_a_minus_is_a_minus_only_before_a_number():
+    assert words.minus("x-velocity -3.5, 1e-05 [-2]") == "x-velocity −3.5, 1e-05 [−2]"

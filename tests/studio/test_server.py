@@ -1,0 +1,148 @@
+"""The server as a whole, without a browser: who is let in at every door, and what can be read through them."""
+
+import io
+import json
+import shutil
+
+import httpx
+import numpy as np
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from jmorl.cli import main
+from jmorl.storage.manifest import read_manifest
+from tests.registered import ThreeWays
+from tests.resuming import train
+from tests.studio.serving import Served
+
+SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport="
+NAME = "<img src=x onerror=alert(1)>"
+
+
+@pytest.fixture(scope="module")
+def runs(compiled_once, small_config, tmp_path_factory):
+    """A finished run in a folder whose name is markup, with a secret beside it."""
+    place = tmp_path_factory.mktemp("studio")
+    train(place / NAME, small_config.replace(env=f"tests.registered:{ThreeWays.id}"))
+    (place / "secret.npz").write_text("secret")
+    return place
+
+
+@pytest.fixture(scope="module")
+def studio(runs):
+    with Served(runs / NAME) as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def guarded(runs):
+    """On all addresses of this machine, with a token."""
+    shutil.copytree(runs / NAME, runs / "other")
+    with Served(runs / "other", "--token", "sesame", host="0.0.0.0") as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def chosen(runs):
+    return json.loads((runs / NAME / "result.json").read_text())["chosen"]["policy"]
+
+
+def run_of(runs):
+    return read_manifest(runs / NAME)["run"]
+
+
+def is_open(served, origin, cookie=None):
+    """Whether the server opens its web socket to a page of this origin."""
+    url = f"ws://127.0.0.1:{served.port}{SOCKET}websocket"
+    try:
+        with connect(url, origin=origin, additional_headers={"Cookie": cookie} if cookie else None) as socket:
+            return socket.recv(timeout=10).startswith("0{")  # Engine.IO's greeting
+    except InvalidStatus as refusal:
+        assert refusal.response.status_code == 403
+        return False
+
+
+def test_the_page_is_there_and_the_name_of_a_run_is_no_markup(studio):
+    page = httpx.get(studio.address)
+    assert page.status_code == 200 and "jmorl studio" in page.text
+    assert "<img src=x" not in page.text
+    assert page.headers["x-frame-options"] == "DENY"
+
+
+def test_sockets_open_to_our_own_page_alone(studio):
+    assert is_open(studio, studio.address)
+    assert not is_open(studio, "http://evil.example")
+    assert not is_open(studio, f"http://127.0.0.1:{studio.port + 1}")
+    polling = studio.address + SOCKET + "polling"
+    assert httpx.get(polling, headers={"origin": studio.address}).status_code == 200
+    foreign = httpx.get(polling, headers={"origin": "http://evil.example"})
+    assert foreign.status_code == 403 and "access-control-allow-origin" not in foreign.headers
+
+
+def test_a_name_that_is_rebound_to_this_machine_is_refused(studio):
+    assert httpx.get(studio.address, headers={"host": f"evil.example:{studio.port}"}).status_code == 421
+
+
+def test_the_policy_file_is_served_whole(studio, runs, chosen):
+    answer = httpx.get(f"{studio.address}/policies/{run_of(runs)}/{chosen}.npz")
+    assert answer.content == (runs / NAME / "chosen.npz").read_bytes()
+    assert "attachment" in answer.headers["content-disposition"]
+    assert json.loads(str(np.load(io.BytesIO(answer.content))["header"]))["id"] == chosen
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/policies/../secret.npz",
+        "/policies/..%2F..%2Fsecret/1.npz",
+        "/policies/RUN/..%2F..%2Fsecret.npz",
+        "/policies/RUN/../../secret.npz",
+        "/policies/RUN/-1.npz",
+        "/policies/RUN/99999.npz",
+        "/policies/another/1.npz",
+        "/episodes/RUN/..%2F..%2Fmanifest.json",
+        "/episodes/../1",
+        "/manifest.json",
+        "/config.toml",
+        "/%2e%2e/secret.npz",
+        "//etc/passwd",
+    ],
+)
+def test_nothing_else_can_be_read(studio, runs, path):
+    answer = httpx.get(studio.address + path.replace("RUN", run_of(runs)))
+    assert answer.status_code in (404, 422)
+    assert "secret" not in answer.text.replace("/secret", "") and "root:" not in answer.text
+
+
+def test_an_environment_without_a_drawing_has_no_playback(studio, runs, chosen):
+    answer = httpx.get(f"{studio.address}/episodes/{run_of(runs)}/{chosen}")
+    assert answer.status_code == 404 and "has no drawing" in answer.json()["detail"]
+
+
+def test_beyond_this_machine_every_door_asks_for_the_token(guarded, runs, chosen):
+    run = read_manifest(runs / "other")["run"]
+    doors = ["/", f"/policies/{run}/{chosen}.npz", f"/episodes/{run}/{chosen}", SOCKET + "polling", "/favicon.ico"]
+    for door in doors:
+        assert httpx.get(guarded.address + door).status_code == 401, door
+    assert not is_open(guarded, guarded.address)
+    assert not is_open(guarded, guarded.address, "jmorl_studio=guess")
+    with httpx.Client(follow_redirects=True) as browser:
+        assert browser.get(guarded.address + "/?token=guess").status_code == 401
+        page = browser.get(guarded.address + "/?token=sesame")
+        assert page.status_code == 200 and "token" not in str(page.url)
+        for door in doors[1:2]:
+            assert browser.get(guarded.address + door).status_code == 200
+    assert is_open(guarded, guarded.address, "jmorl_studio=sesame")
+    assert not is_open(guarded, "http://evil.example", "jmorl_studio=sesame")
+
+
+def test_the_address_is_printed_with_the_token(guarded, studio):
+    assert f":{guarded.port}/?token=sesame" in guarded.log[-1] and "token" not in studio.log[-1]
+
+
+def test_a_port_that_is_taken_is_said_before_anything_is_made(studio, tmp_path, capsys):
+    arguments = ["studio", "--port", str(studio.port), "--out", str(tmp_path / "run")]
+    assert main(arguments) == 1
+    assert f"cannot listen on 127.0.0.1, port {studio.port}" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

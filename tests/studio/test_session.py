@@ -1,0 +1,267 @@
+"""A run driven beside a page: what is answered, left, taken up and branched off, without any page."""
+
+import json
+
+import numpy as np
+import pytest
+
+import envs
+from jmorl.decision.protocol import Answer, Choose
+from jmorl.decision.scripted import ScriptedUser
+from jmorl.search.policy import values_of
+from jmorl.storage.afterwards import choose_afterwards
+from jmorl.storage.continuing import Continued, resume
+from jmorl.storage.run_folder import RunFolder
+from jmorl.storage.stored_run import read_run
+from tests.resuming import follow, outcome
+
+
+def best(question, objective):
+    return max(question.front, key=lambda policy: policy.values[objective]).id
+
+
+def answer_all(session, objective=0):
+    """Answer every question until the run ends; the answers."""
+    answers = []
+    while True:
+        question = session.question()
+        answers.append(best(question, objective))
+        assert session.answer(question, Answer(answers[-1]))
+        if question.purpose == "final":
+            session.ended()
+            return answers
+
+
+def test_a_run_steered_on_the_page_replays_from_its_log_to_the_same_result(session, person_config, tmp_path):
+    answers = answer_all(session)
+    view = session.view
+    assert view.result.id == answers[-1] and view.timeline is None and view.question is None
+    assert view.reason == "the budget of environment steps is used up"
+    config = person_config.replace(user=f"script={view.path / 'decisions.jsonl'}")
+    folder = RunFolder.create(tmp_path / "replayed", config, envs.make(config.env))
+    replayed = outcome(follow(Continued(folder, None)))
+    played = outcome(view.path)
+    assert replayed[4] == played[4] and replayed[2][2] == played[2][2]
+    assert (view.path / "plots").is_dir()
+
+
+def test_the_first_answer_counts_and_the_second_is_told(session):
+    question = session.question()
+    first, second = question.front[0].id, question.front[-1].id
+    assert session.answer(question, Answer(first))
+    assert not session.answer(question, Answer(second))
+    session.question()
+    assert not session.answer(question, Answer(second))  # nor does it answer the next question
+    line = json.loads((session.view.path / "decisions.jsonl").read_text())
+    assert line["policy"] == first and session.view.previous.id == first
+
+
+def test_a_policy_that_is_not_shown_is_no_answer_and_the_question_stays_open(session):
+    question = session.question()
+    with pytest.raises(ValueError, match="policy 99 is not among"):
+        session.answer(question, Answer(99))
+    assert session.view.question is question and session.answer(question, Answer(question.front[0].id))
+
+
+def test_the_view_follows_the_run(session):
+    question = session.question()
+    first = session.view
+    assert first.front == question.front == first.state.archive.members
+    assert [generation.number for generation in first.generations] == [0]
+    assert np.isneginf(first.bounds).all() and first.previous is None
+    chosen = question.front[0]
+    session.answer(question, Answer(chosen.id))
+    question = session.question()
+    second = session.view
+    assert [generation.number for generation in second.generations] == [0, 1]
+    np.testing.assert_array_equal(second.bounds, question.bounds)
+    assert np.isfinite(second.bounds).all() and second.previous is chosen
+    assert [generation for generation, _ in second.choices] == [1]
+    np.testing.assert_array_equal(second.choices[0][1], chosen.values)
+    np.testing.assert_array_equal(second.generations[-1].front, values_of(second.front))
+    assert first.question is not None  # a record is never changed
+
+
+def test_a_run_that_is_left_asks_its_open_question_again_and_no_other(session, make_session):
+    first = session.question()
+    session.answer(first, Answer(first.front[0].id))
+    open_question = session.question()
+    session.close()
+    assert not session.answer(open_question, Answer(open_question.front[0].id))
+    later = make_session()
+    later.open(session.view.path)
+    again = later.question()
+    assert (again.generation, again.purpose) == (2, "steer")
+    assert [policy.id for policy in again.front] == [policy.id for policy in open_question.front]
+    assert later.view.previous.id == first.front[0].id
+    assert [generation.number for generation in later.view.generations] == [0, 1]
+    assert [generation for generation, _ in later.view.choices] == [1]
+
+
+def test_stepping_back_begins_a_branch_and_the_run_left_behind_can_be_taken_up(session):
+    for _ in range(2):
+        question = session.question()
+        session.answer(question, Answer(best(question, 0)))
+    left = session.question()
+    path, run = session.view.path, session.view.run
+    session.step_back(run, 1)
+    again = session.question()
+    assert again.generation == 1 and session.view.path == path.with_name("run-2")
+    assert session.view.previous is None and not session.view.choices
+    session.answer(again, Answer(best(again, 2)))
+    session.question()
+    tree = session.history()
+    assert [(each.name, each.depth, each.leaves_after) for each in tree] == [("run", 0, -1), ("run-2", 1, 0)]
+    assert [[step.generation for step in each.steps] for each in tree] == [[1, 2], [1]]
+    assert tree[0].steps[0].policy != tree[1].steps[0].policy
+    assert 0 in tree[1].checkpoints
+    session.switch(run)
+    back = session.question()
+    assert back.generation == 3 and [p.id for p in back.front] == [p.id for p in left.front]
+    assert session.view.path == path
+    session.step_back(run, 3)
+    assert session.question().generation == 3 and session.view.path == path.with_name("run-3")
+
+
+def test_of_two_that_step_back_at_once_the_second_is_told(session, monkeypatch):
+    question, told = session.question(), []
+    leave = session.leave
+
+    def meanwhile():
+        with pytest.raises(ValueError, match="another tab is just leaving"):
+            session.step_back(session.view.run, 1)
+        told.append(True)
+        leave()
+
+    monkeypatch.setattr(session, "leave", meanwhile)
+    session.step_back(session.view.run, question.generation)
+    assert told and session.question().generation == 1
+    monkeypatch.undo()
+    assert [branch.name for branch in session.history()] == ["run", "run-2"]
+
+
+def test_only_runs_of_the_history_can_be_opened(session):
+    session.question()
+    with pytest.raises(ValueError, match="no run of this history"):
+        session.switch("../elsewhere")
+    with pytest.raises(ValueError, match="no run of this history"):
+        session.step_back("another", 1)
+    assert session.view.question is not None  # and nothing was left
+
+
+def test_files_are_found_by_run_and_number_alone(session):
+    question = session.question()
+    policy = question.front[0].id
+    assert session.policy_file(session.view.run, policy).name == f"{policy:05d}.npz"
+    assert session.policy_file(session.view.run, 9999) is None
+    assert session.policy_file("..", policy) is None
+
+
+def test_going_on_in_silence_and_stopping(session):
+    question = session.question()
+    session.answer(question, Answer(question.front[0].id, generations=2))
+    question = session.question()
+    assert question.generation == 3
+    session.answer(question, Answer(question.front[0].id, stop=True))
+    session.ended()
+    assert session.view.reason == "the user ended it" and session.view.result.id == question.front[0].id
+
+
+def test_a_finished_run_is_shown_and_can_be_branched_off(session, make_session):
+    answer_all(session)
+    path = session.view.path
+    session.close()
+    later = make_session()
+    later.open(path)
+    assert later.view.timeline is None and later.view.result.id == session.view.result.id
+    np.testing.assert_allclose(values_of(later.view.front), values_of(session.view.front))
+    for shown, lived in zip(later.view.generations, session.view.generations, strict=True):
+        np.testing.assert_allclose(np.sort(shown.front, axis=0), np.sort(lived.front, axis=0))
+        np.testing.assert_allclose(shown.hypervolume, lived.hypervolume)
+    later.step_back(later.view.run, 2)
+    assert later.question().generation == 2
+    assert read_run(path).result is not None  # it stays as it was
+
+
+def test_a_run_with_an_artificial_user_is_watched(compiled_once, small_config, make_session, tmp_path):
+    session = make_session()
+    folder = RunFolder.create(tmp_path / "run", small_config, envs.make(small_config.env))
+    session.drive(Continued(folder, None))
+    session.ended()
+    assert session.view.result and session.asked.empty()
+    assert all(generation.utility is not None for generation in session.view.generations)
+
+
+def test_what_is_laid_out_is_seen_in_the_light_of_the_question(session):
+    question = session.question()
+    first, second = question.front[0], question.front[-1]
+    for policy in (first, second):
+        session.look_at(policy.id)
+    session.look_at(12345)  # there is none
+    session.thought()
+    desk = session.desk
+    assert desk.letters == {first.id: "A", second.id: "B"} and desk.focus == second.id
+    assert set(desk.prospects) == {first.id, second.id}
+    session.answer(question, Answer(second.id))
+    session.question()
+    session.thought()
+    np.testing.assert_array_equal(session.view.bounds, desk.prospects[second.id].bounds)
+    assert set(session.desk.prospects) <= set(session.desk.letters)
+    for policy in tuple(session.desk.letters):
+        session.put_away(policy)
+    assert session.desk.focus is None
+
+
+def test_more_is_more_than_the_policy_that_was_in_focus_when_it_was_asked_for(session):
+    question = session.question()
+    first, second = question.front[0].id, question.front[-1].id
+    session.more_of(1)
+    assert (session.desk.more_of, session.desk.than) == (1, None)  # nothing to compare with
+    session.look_at(first)
+    session.more_of(1)
+    session.look_at(second)
+    assert session.desk.than == first
+    session.more_of(None)
+    assert session.desk.more_of is None
+
+
+def test_enautilus_in_a_finished_run_is_what_the_command_would_have_been_led_to(session):
+    answer_all(session)
+    session.begin_dialogue(3, 2)
+    while not session.dialogue.chosen:
+        at = session.dialogue
+        assert session.reply(at, Choose(len(at.question.points) - 1))
+        assert not session.reply(at, Choose(0))  # another tab was first
+    chosen, path = session.dialogue.chosen, session.view.path
+    assert json.loads((path / "enautilus.json").read_text())["policy"] == chosen.id
+    assert session.desk.focus == chosen.id
+    stored = read_run(path)
+    assert choose_afterwards(stored, ScriptedUser(path / "enautilus.jsonl"), 3, 2).id == chosen.id
+
+
+def test_the_last_answer_of_enautilus_can_be_taken_back_at_its_end(session):
+    answer_all(session)
+    session.begin_dialogue(1, 2)
+    before = session.dialogue
+    session.reply(before, Choose(0))
+    assert session.dialogue.chosen
+    session.undo_reply()
+    assert session.dialogue is before
+    session.close_dialogue()
+    assert session.dialogue is None
+
+
+def test_what_breaks_a_run_off_is_said(compiled_once, person_config, make_session, tmp_path, monkeypatch):
+    session = make_session()
+    folder = RunFolder.create(tmp_path / "run", person_config, envs.make(person_config.env))
+
+    def full(event):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(folder, "record", full)
+    session.drive(Continued(folder, None))
+    session.ended()
+    assert "No space left on device" in session.view.problem and session.view.timeline is None
+    continued = resume(session.view.path)
+    continued.folder.close()
+    assert continued.state is None
