@@ -9,7 +9,7 @@ from rich.console import Console
 
 from jmorl.display.text import duration, short_count
 from jmorl.learning.population import TrainingFault
-from jmorl.paper.plan import ITEMS, NAMES, Cell, Plan, distinct, in_order
+from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, Cell, Plan, distinct, in_order
 from jmorl.paper.report import Scope, write_report
 from jmorl.paper.runner import Places, known, make, missing
 from jmorl.paper.targets import propose
@@ -37,12 +37,12 @@ def make_paper(
     items = [item for item in ITEMS.values() if only is None or item.name in only]
     parts = [_Part(item.name, each, plan.cells(item, each)) for item, each in in_order(items, units)]
     if only and "targets" in only:
-        parts += [_Part(f"targets, {NAMES[env]}", "raw", plan.pilots(env)) for env in NAMES]
+        parts.append(_Part(f"targets, {NAMES[CHEETAH]}", "raw", plan.pilots(CHEETAH)))
     if run:
         _make_all(parts, places, console)
     if only and "targets" in only:
-        for env in NAMES:
-            console.print(propose(env, known(plan.pilots(env), places)), soft_wrap=True, highlight=False)
+        proposed = propose(CHEETAH, known(plan.pilots(CHEETAH), places))
+        console.print(proposed, soft_wrap=True, highlight=False)
     if items:
         cells = distinct(cell for part in parts for cell in part.cells)
         path = write_report(out, Scope(plan, items, units), known(cells, places))
