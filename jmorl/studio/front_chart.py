@@ -168,7 +168,7 @@ def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
 
 def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
     data = [[view.result.id, *plain(view.result.values)[0], "the result"]] if view.result else []
-    looks = {"symbol": STAR, "symbolSize": 20, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
+    looks = {"symbol": STAR, "symbolSize": 32, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
     return _scatter("result", data, axes, silent=True, z=6, **looks)
 
 
