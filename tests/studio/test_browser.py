@@ -133,14 +133,14 @@ def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, 
         tab.page.reload()
         tab.asked(1)
         tab.card(policy).wait_for()  # what was laid out still is
-        shown = tab.rows().all_inner_texts()
+        shown = tab.policies()
         studio.kill()
         assert not (path / "decisions.jsonl").exists()
     with Served(path, port=port) as studio:
         tab.page.wait_for_timeout(1000)
         tab.page.reload()
         tab.asked(1)
-        assert tab.rows().all_inner_texts() == shown
+        assert tab.policies() == shown
         chosen = tab.choose(0)
         tab.asked(2)
         studio.kill()
