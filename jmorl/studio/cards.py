@@ -62,6 +62,10 @@ class Card:
         with ui.element("div").classes("card-head"):
             ui.label(letter).classes(f"letter mark-{letter}")
             ui.label(f"policy {policy.id}").classes("card-title")
+            address = f"/policies/{view.run}/{policy.id}.npz"
+            ui.button(icon="download", on_click=lambda: ui.download(address)).props(
+                f'flat dense round size=xs aria-label="save the file of policy {policy.id}"'
+            )
             ui.button(icon="close", on_click=lambda: page.put_away(policy.id)).props(
                 f'flat dense round size=xs aria-label="put policy {policy.id} away"'
             )

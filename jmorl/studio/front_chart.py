@@ -6,7 +6,8 @@ import numpy as np
 
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion
-from jmorl.display.limits import around, core
+from jmorl.display.limits import around, core, inside
+from jmorl.display.text import plural
 from jmorl.search.bounds import within
 from jmorl.studio.desk import Desk
 from jmorl.studio.looks import (
@@ -36,13 +37,16 @@ MANY = 300  # policies; more are drawn smaller
 def front_options(view: View, axes: tuple[int, int]) -> dict[str, Any]:
     """What stays while policies are looked at, with the objectives `axes` to the right and upwards."""
     limits = _limits(view)
+    far_out = int((~inside(view.values, limits)).sum()) if view.front else 0
+    note = f"{plural(far_out, 'policy')} far out, in the table only" if far_out else ""
     return {
         **_frame(view, axes, limits, visible=True),
+        "title": {"text": note, "right": 18, "top": 0, "textStyle": {**TEXT, "color": GREY, "fontWeight": "normal"}},
         "series": [
             _area("bounds", view.bounds, axes, limits, IN_FORCE),
             _ghosts(view, axes),
-            _members(view, axes, inside=False),
-            _members(view, axes, inside=True),
+            _members(view, axes, within_bounds=False),
+            _members(view, axes, within_bounds=True),
             _journey(view, axes),
             _result(view, axes),
         ],
@@ -117,28 +121,28 @@ def _scatter(name: str, data: list[Any], axes: tuple[int, int], **looks: Any) ->
     }
 
 
-def _members(view: View, axes: tuple[int, int], inside: bool) -> dict[str, Any]:
+def _members(view: View, axes: tuple[int, int], within_bounds: bool) -> dict[str, Any]:
     """Members of the front within the bounds, or those outside them; pale if they cannot be chosen."""
-    kept = within(view.values, view.bounds) == inside
+    kept = within(view.values, view.bounds) == within_bounds
     data = [
-        [policy.id, *values, "" if inside else "outside the bounds"]
+        [policy.id, *values, "" if within_bounds else "outside the bounds"]
         for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
         if shown
     ]
-    open_to_choice = inside or view.question is None or view.question.purpose == "steer"
-    look = {"color": BLUE} if inside else {"color": "#ffffff", "borderWidth": 1.5}
-    border = {"borderColor": "#ffffff"} if inside else {"borderColor": BLUE if open_to_choice else PALE}
+    open_to_choice = within_bounds or view.question is None or view.question.purpose == "steer"
+    look = {"color": BLUE} if within_bounds else {"color": "#ffffff", "borderWidth": 1.5}
+    border = {"borderColor": "#ffffff"} if within_bounds else {"borderColor": BLUE if open_to_choice else PALE}
     names = ["policy", *(f"{each.label} ({each.unit})" for each in view.objectives), "note"]
     return _scatter(
-        "within the bounds" if inside else "outside the bounds",
+        "within the bounds" if within_bounds else "outside the bounds",
         data,
         axes,
         dimensions=names,
         tooltip={":formatter": TOOLTIP_TEXT},
-        symbolSize=(9 if inside else 7) if len(view.front) <= MANY else 5,
+        symbolSize=(9 if within_bounds else 7) if len(view.front) <= MANY else 5,
         itemStyle={**look, **border},
         emphasis={"scale": 1.6},
-        z=4 if inside else 3,
+        z=4 if within_bounds else 3,
     )
 
 
@@ -168,7 +172,7 @@ def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
 
 def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
     data = [[view.result.id, *plain(view.result.values)[0], "the result"]] if view.result else []
-    looks = {"symbol": STAR, "symbolSize": 20, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
+    looks = {"symbol": STAR, "symbolSize": 32, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
     return _scatter("result", data, axes, silent=True, z=6, **looks)
 
 

@@ -33,6 +33,7 @@ class QuestionBar:
         if shown == self.shown:  # nobody shall lose a button that they are about to press
             return
         self.shown = shown
+        self.generations = 1  # of silence, anew for each question
         self.buttons.clear()
         with self.buttons:
             if view.front:

@@ -49,6 +49,10 @@ class Tab:
     def rows(self):
         return self.page.locator(".policies-row")
 
+    def policies(self):
+        """The numbers of the policies in the table, from the top."""
+        return self.page.locator(".policies-row > span:nth-child(2)").all_inner_texts()
+
     def look_at(self, row):
         """Click a row of the table; the number of its policy, when its card is there."""
         cell = self.rows().nth(row)

@@ -12,6 +12,9 @@ from tests.studio.browsing import Tab, chromium
 from tests.studio.serving import Served, free_port
 
 pytestmark = pytest.mark.studio
+# E-NAUTILUS shows its question with so many iterations left, or has ended.
+LEFT_OR_ENDED = """(left) => document.querySelector('[aria-label="iterations left"]')?.value === left
+  || document.querySelector(".ending")"""
 
 
 @pytest.fixture(scope="module")
@@ -88,11 +91,11 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         tab.page.get_by_text("Which point do you prefer").wait_for()
         tab.screenshot("7-enautilus")
         tab.page.get_by_role("button", name="Step back").click()
-        for _ in range(3):
+        for left in (3, 2, 1):
+            tab.page.wait_for_function(LEFT_OR_ENDED, arg=str(left))
             if tab.page.get_by_text("E-NAUTILUS ends on").count():
                 break
             tab.page.get_by_role("button", name="Prefer").first.click()
-            tab.page.wait_for_timeout(500)
         tab.page.get_by_text("E-NAUTILUS ends on").wait_for()
         ended_on = json.loads((branch / "enautilus.json").read_text())["policy"]
         assert tab.card(ended_on).is_visible()
@@ -130,14 +133,14 @@ def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, 
         tab.page.reload()
         tab.asked(1)
         tab.card(policy).wait_for()  # what was laid out still is
-        shown = tab.rows().all_inner_texts()
+        shown = tab.policies()
         studio.kill()
         assert not (path / "decisions.jsonl").exists()
     with Served(path, port=port) as studio:
         tab.page.wait_for_timeout(1000)
         tab.page.reload()
         tab.asked(1)
-        assert tab.rows().all_inner_texts() == shown
+        assert tab.policies() == shown
         chosen = tab.choose(0)
         tab.asked(2)
         studio.kill()

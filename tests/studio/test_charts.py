@@ -71,6 +71,13 @@ def test_axes_hold_the_front_the_bounds_and_the_choice(view):
     assert "time (-steps)" in options["xAxis"]["name"] and "better" in options["xAxis"]["name"]
 
 
+def test_what_is_too_far_out_to_be_shown_is_counted(view):
+    assert front_options(view, (0, 1))["title"]["text"] == ""
+    with_stray = replace(view, front=(*view.front, policy(6, (-75.0, -30.0)), policy(7, (-900.0, -5.0))))
+    options = front_options(with_stray, (0, 1))
+    assert options["title"]["text"] == "1 policy far out, in the table only" and options["xAxis"]["min"] > -200
+
+
 def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
     asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
     empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
