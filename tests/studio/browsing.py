@@ -39,6 +39,14 @@ class Tab:
         if not request.url.startswith((self.address, self.address.replace("http", "ws"), "data:", "blob:")):
             self.problems.append(f"asked for {request.url}")
 
+    def lost(self):
+        """Note that this page is about to lose its server."""
+        self.page.evaluate("window.lost = true")
+
+    def found_again(self):
+        """Wait until the page has by itself made way for one that the server knows."""
+        self.page.wait_for_function("!window.lost && window.did_handshake")
+
     def asked(self, generation):
         """Wait until the question before this generation is open."""
         self.page.get_by_text(f"Generation {generation}: which of these").wait_for()

@@ -134,20 +134,22 @@ def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, 
         tab.asked(1)
         tab.card(policy).wait_for()  # what was laid out still is
         shown = tab.policies()
+        tab.lost()
         studio.kill()
         assert not (path / "decisions.jsonl").exists()
     with Served(path, port=port) as studio:
-        tab.page.wait_for_timeout(1000)
-        tab.page.reload()
+        tab.found_again()
         tab.asked(1)
         assert tab.policies() == shown
         chosen = tab.choose(0)
         tab.asked(2)
+        tab.lost()
         studio.kill()
     with Served(path, port=port) as studio:
-        again = Tab(browser, studio.address)  # a new tab, and the old one finds the server again by itself
-        again.asked(2)
+        tab.found_again()
         tab.asked(2)
+        again = Tab(browser, studio.address)  # in place of a tab that was closed
+        again.asked(2)
         assert [(each["generation"], each["policy"]) for each in decisions(path)] == [(1, chosen)]
         again.page.close()
         tab.choose(0)
