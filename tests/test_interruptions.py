@@ -17,6 +17,14 @@ RUN = sys.modules["jmorl.run"]
 NOBODY = 65534
 
 
+@pytest.fixture(autouse=True)
+def _interrupts_are_heard():
+    """A background job of a shell ignores SIGINT, and so would the runs in a test suite that is one."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_after_its_generation_and_says_how_to_go_on(
     whole, small_config, tmp_path, capsys, monkeypatch, number
