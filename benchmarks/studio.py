@@ -6,6 +6,7 @@ serving       how much longer the generations of a run take that a page is open 
 """
 
 import json
+import re
 import statistics
 import subprocess
 import sys
@@ -145,12 +146,11 @@ def question(folder: Path) -> list[float]:
             if generation > 1:
                 waited.append(time.perf_counter() - started)
             page.locator(".policies-row").first.click()
-            choose = page.get_by_role("button", name="Choose A", exact=True)
+            choose = page.locator(".place.focus").get_by_role("button", name=re.compile("^Choose"))
             choose.wait_for()
             started = time.perf_counter()
             choose.click()
-    own = read_run(folder / "question").metrics["total_seconds"][1:5]
-    return [float(each) for each in np.array(waited) - own[: len(waited)]]
+    return (np.array(waited) - _seconds(folder / "question")[: len(waited)]).tolist()
 
 
 def serving(folder: Path) -> tuple[list[float], list[float]]:
@@ -161,16 +161,18 @@ def serving(folder: Path) -> tuple[list[float], list[float]]:
         path = folder / f"alone{repeat}"
         command = [sys.executable, "-m", "jmorl.cli", "train", "--quiet", "--out", str(path), *settings]
         subprocess.run(command, check=True)
-        alone.append(_generation_seconds(path))
+        alone.append(float(_seconds(path).sum()))
         path = folder / f"watched{repeat}"
         with served("jmorl.cli", "studio", "--out", str(path), "--port", str(PORT), *settings), browser_page() as page:
             page.get_by_text("The result is policy").wait_for(timeout=600_000)
-        watched.append(_generation_seconds(path))
+        watched.append(float(_seconds(path).sum()))
     return alone, watched
 
 
-def _generation_seconds(path: Path) -> float:
-    return float(read_run(path).metrics["total_seconds"][1:].sum())
+def _seconds(path: Path) -> np.ndarray:  # [G]
+    """What each generation after the warm-up took."""
+    metrics = read_run(path).metrics
+    return np.asarray(sum(metrics[f"{part}_seconds"] for part in ("select", "train", "evaluate")))[1:]
 
 
 def main() -> None:
