@@ -20,7 +20,7 @@ from typing import Any
 
 import httpx
 import numpy as np
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 from rich.console import Console
 from rich.table import Table
 
@@ -32,10 +32,9 @@ from jmorl.steering import Prospect
 from jmorl.storage.stored_run import read_run
 from jmorl.studio.session import Session
 from jmorl.studio.view import Generation, View
+from tests.studio.browsing import chromium
 
 RESULTS = Path(__file__).parent / "studio.json"
-CHROMIUM = "/usr/bin/chromium"
-FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
 POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 3
 # Time in the browser, from a click on the n-th row in sight to the first picture that has the row and its card.
 CLICK = """(n) => new Promise((done) => {
@@ -120,12 +119,10 @@ def served(*command: str) -> Iterator[None]:
 
 @contextmanager
 def browser_page() -> Iterator[Page]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    with chromium() as browser:
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.goto(f"http://127.0.0.1:{PORT}")
         yield page
-        browser.close()
 
 
 def interaction() -> list[float]:
