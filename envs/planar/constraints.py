@@ -18,7 +18,7 @@ from envs.planar.tree import constant
 class Contacts(NamedTuple):
     """Both ends of every capsule against the ground: [2 ends, slots, batch] each."""
 
-    x: jax.Array  # contact point about O, half-way into the overlap
+    x: jax.Array  # contact point about the body's hinge, half-way into the overlap
     z: jax.Array
     strength: jax.Array  # D, the inverse regularisation; 0 where nothing touches
     reference_x: jax.Array  # the acceleration at which the constraint is content
@@ -38,7 +38,7 @@ def contacts(model: PlanarModel, moving: Kinematics) -> Contacts:
     """The contacts of a state."""
     radius = constant(model.contact_distance, moving.end)
     x, end_z = moving.end
-    depth = radius + model.ground - moving.height - end_z  # positive in the ground
+    depth = radius + model.ground - moving.height - moving.hinge[1] - end_z  # positive in the ground
     half = 0.5 * depth - radius  # from the end up to the contact point
     velocity_x, velocity_z = moving.end_velocity
     velocity_x = velocity_x + moving.turning * half
@@ -73,7 +73,7 @@ def limits(model: PlanarModel, qpos: jax.Array, qvel: jax.Array) -> Limits:
 def contact_residuals(touching: Contacts, acceleration: jax.Array) -> jax.Array:
     """Residuals [3 rows, 2 ends, slots, batch] of the edges n + mu t, n - mu t and n.
 
-    `acceleration` [3, slots, batch] is each body's (w, u, v): angular, and of its point at O.
+    `acceleration` [3, slots, batch] is each body's (w, u, v): angular, and of its point at its hinge.
     """
     angular, along_x, along_z = acceleration
     tangential = touching.friction * (along_x + angular * touching.z - touching.reference_x)
@@ -89,8 +89,8 @@ def limit_residuals(stops: Limits, qacc: jax.Array) -> jax.Array:  # [V, batch] 
 def contact_stiffness(touching: Contacts, active: jax.Array) -> jax.Array:
     """What the active rows [3, 2 ends, slots, batch] add to each slot's articulated inertia [9, slots, batch].
 
-    A row's `J' D J` is stiffness in the plane at the contact point, told about O as a symmetric 3x3; its `J' D aref`
-    is a force.
+    A row's `J' D J` is stiffness in the plane at the contact point, told about the hinge as a symmetric 3x3; its
+    `J' D aref` is a force.
     """
     plus, minus, normal = jnp.where(active, touching.strength, 0.0)
     xx = touching.friction**2 * (plus + minus)
@@ -103,21 +103,6 @@ def contact_stiffness(touching: Contacts, active: jax.Array) -> jax.Array:
     moment = force_x * z - force_z * x
     ends = (turn_x * z - turn_z * x, turn_x, turn_z, xx, xz, zz, moment, force_x, force_z)
     return jnp.stack([component[0] + component[1] for component in ends])
-
-
-def contact_forces(touching: Contacts, residuals: jax.Array) -> jax.Array:
-    """The contacts' spatial forces [3, slots, batch] about O."""
-    plus, minus, normal = -touching.strength * jnp.minimum(residuals, 0.0)
-    force_x = touching.friction * (plus - minus)
-    force_z = plus + minus + 2 * normal
-    ends = (force_x * touching.z - force_z * touching.x, force_x, force_z)
-    return jnp.stack([component[0] + component[1] for component in ends])
-
-
-def limit_forces(stops: Limits, residuals: jax.Array) -> jax.Array:
-    """The limits' joint forces [V, batch]."""
-    force = -stops.direction * stops.strength * jnp.minimum(residuals, 0.0)
-    return jnp.concatenate([jnp.zeros((2, force.shape[-1]), force.dtype), force])
 
 
 def _impedance(constraints: Constraints, depth: jax.Array) -> jax.Array:

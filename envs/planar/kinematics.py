@@ -1,7 +1,8 @@
 """Where everything is and how it moves: positions, velocities, and accelerations at zero joint acceleration.
 
-Plane (x, z), rotation phi about +y: `R(phi)(a, b) = (a cos + b sin, -a sin + b cos)`. Everything is told about the
-root's anchor O, with axes along the world's: the world's x never enters, so nothing loses digits far from its origin.
+Plane (x, z), rotation phi about +y: `R(phi)(a, b) = (a cos + b sin, -a sin + b cos)`. Axes are along the world's. A
+body's points are told about its own hinge, where they are small, and hinges about that of the root, O: the world's x
+never enters, so nothing loses digits far from its origin.
 """
 
 from typing import NamedTuple
@@ -15,14 +16,15 @@ from envs.planar.tree import at_slots, constant, pick
 
 
 class Kinematics(NamedTuple):
-    """Slots' points, and the levels' hinges."""
+    """The levels' hinges, and slots' points about the hinge of their body."""
 
     height: jax.Array  # [batch] of O above the world's origin
-    anchors: tuple[jax.Array, ...]  # each [2, bodies of the level, batch]: hinges about O
+    offsets: tuple[jax.Array, ...]  # levels below the root, [2, bodies, batch] each: hinges about their parents'
+    hinge: jax.Array  # [2, slots, batch] about O
     turning: jax.Array  # [slots, batch] angular velocity about +y
-    centre: jax.Array  # [2, slots, batch] centre of mass about O
+    centre: jax.Array  # [2, slots, batch] centre of mass about the hinge
     centre_acceleration: jax.Array  # [2, slots, batch] at zero joint acceleration, without gravity
-    end: jax.Array  # [2, 2 ends, slots, batch] capsule ends about O
+    end: jax.Array  # [2, 2 ends, slots, batch] capsule ends about the hinge
     end_velocity: jax.Array  # [2, 2 ends, slots, batch] in the world
 
 
@@ -39,21 +41,24 @@ def kinematics(model: PlanarModel, qpos: jax.Array, qvel: jax.Array) -> Kinemati
     batch = qpos.shape[-1]
     still = jnp.zeros((2, 2, 1, batch), qpos.dtype)
     hinges = [jnp.concatenate([still, qvel[None, :2, None]])]  # each [3, 2, bodies, batch]
+    offsets = []
     for above, level in zip(model.levels, model.levels[1:], strict=False):
         slot = above.first_slot[level.parent]
         offset = _turned(level.anchor, pick(cosine, slot), pick(sine, slot))
+        offsets.append(offset[0])
         hinges.append(pick(hinges[-1], level.parent) + offset * pick(rates, slot))
-    origins = at_slots(model, hinges)
-    centre = origins[:2] + _turned(model.slot_centre, cosine, sine)[:2] * rates[:2]
-    ends = origins[::2, :, None] + _turned(model.slot_ends, cosine, sine)[::2] * rates[::2, :, None]
+    hinge = at_slots(model, hinges)
+    centre = _turned(model.slot_centre, cosine, sine)
+    ends = _turned(model.slot_ends, cosine, sine)
     return Kinematics(
         height=qpos[1] + float(model.root_position[1]),
-        anchors=tuple(hinge[0] for hinge in hinges),
+        offsets=tuple(offsets),
+        hinge=hinge[0],
         turning=turning,
         centre=centre[0],
-        centre_acceleration=centre[1],
+        centre_acceleration=hinge[1] + centre[1] * rates[1],
         end=ends[0],
-        end_velocity=ends[1],
+        end_velocity=hinge[2, :, None] + ends[2] * rates[2],
     )
 
 

@@ -5,8 +5,10 @@ Newton's Hessian is `M + sum J' D J`, and a contact's `J' D J` is a spatial stif
 Hessian is built like a mass matrix, and one elimination along the tree solves it in O(bodies) (articulated bodies,
 Featherstone 2008).
 
-Spatial vectors about O are triples: motion (w, u, v), force (moment, f_x, f_z). What a body resists and what pulls at
-it are one array of nine components [9, n, batch]: the symmetric 3x3 as (ww, wu, wv, uu, uv, vv), then the force.
+Spatial vectors are triples: motion (w, u, v), force (moment, f_x, f_z). Each body's are about its own hinge: about one
+point for all, a light foot's resistance would be a small difference of large numbers. What a body resists and what
+pulls at it are one array of nine components [9, n, batch]: the symmetric 3x3 as (ww, wu, wv, uu, uv, vv), then the
+force.
 """
 
 from typing import NamedTuple
@@ -38,7 +40,7 @@ class Joints(NamedTuple):
 
 
 def body_inertia(model: PlanarModel, moving: Kinematics) -> jax.Array:
-    """Each slot's inertia about O, with gravity and bias force as what pulls at it [9, slots, batch]."""
+    """Each slot's inertia about its hinge, with gravity and bias force as what pulls at it [9, slots, batch]."""
     mass = constant(model.slot_mass, moving.centre)
     x, z = moving.centre
     force_x = -mass * moving.centre_acceleration[0]
@@ -50,27 +52,26 @@ def body_inertia(model: PlanarModel, moving: Kinematics) -> jax.Array:
 
 
 def accelerations(
-    model: PlanarModel, anchors: tuple[jax.Array, ...], bodies: jax.Array, joints: Joints
+    model: PlanarModel, offsets: tuple[jax.Array, ...], bodies: jax.Array, joints: Joints
 ) -> tuple[jax.Array, jax.Array]:
     """Joint accelerations [V, batch], and each slot's (w, u, v) [3, slots, batch], of `bodies` [9, slots, batch]."""
     eliminated = []
     carried: jax.Array | float = 0.0
     for depth in range(len(model.levels) - 1, 0, -1):
         level = model.levels[depth]
-        whole = _bodies(bodies, level) + carried
-        hinge = _eliminate(model, level, anchors[depth], whole, joints)
+        hinge = _eliminated(model, level, _bodies(bodies, level) + carried, joints)
         eliminated.append(hinge)
-        carried = total(_reduced(whole, hinge), level.parent, model.levels[depth - 1].count)
+        felt = _about_parent(hinge.rest, offsets[depth - 1])
+        carried = total(felt, level.parent, model.levels[depth - 1].count)
     root = model.levels[0]
     motion = _root_motion(model, _bodies(bodies, root) + carried, joints)
     motions = [motion]
     qacc = [motion[1], motion[2], constant(model.hinge_sign[:1], motion) * motion[0]]
-    for depth, level in enumerate(model.levels[1:], start=1):
-        hinge = eliminated[-depth]
-        w, u, v = above = pick(motions[-1], level.parent)
+    for level, hinge, (x, z) in zip(model.levels[1:], reversed(eliminated), offsets, strict=True):
+        w, u, v = pick(motions[-1], level.parent)
+        u, v = u + w * z, v - w * x
         turn = (hinge.force - hinge.w * w - hinge.u * u - hinge.v * v) * hinge.inverse
-        x, z = anchors[depth]
-        motions.append(above + jnp.stack([turn, -z * turn, x * turn]))
+        motions.append(jnp.stack(jnp.broadcast_arrays(w + turn, u, v)))
         qacc.append(constant(model.hinge_sign[level.bodies], turn) * turn)
     return jnp.concatenate(qacc), at_slots(model, motions)
 
@@ -88,27 +89,30 @@ class _Hinge(NamedTuple):
     v: jax.Array
     force: jax.Array
     inverse: jax.Array
+    rest: jax.Array  # [9, n, batch] what is left of the bodies, free to give way
 
 
-def _eliminate(model: PlanarModel, level: Level, anchor: jax.Array, whole: jax.Array, joints: Joints) -> _Hinge:
-    """The hinges of a level, axes (1, -p_z, p_x) about O, of bodies [9, n, batch]."""
-    x, z = anchor
+def _eliminated(model: PlanarModel, level: Level, whole: jax.Array, joints: Joints) -> _Hinge:
+    """The hinges of a level, of bodies [9, n, batch] about them: to turn is the first component."""
     ww, wu, wv, uu, uv, vv, moment, force_x, force_z = whole
-    w = ww - z * wu + x * wv
-    u = wu - z * uu + x * uv
-    v = wv - z * uv + x * vv
-    sign = constant(model.hinge_sign[level.bodies], whole)
-    force = moment - z * force_x + x * force_z + sign * joints.force[level.dofs]
-    inverse = 1 / (w - z * u + x * v + joints.inertia[level.dofs])
-    return _Hinge(w, u, v, force, inverse)
+    drive = constant(model.hinge_sign[level.bodies], whole) * joints.force[level.dofs]
+    own = joints.inertia[level.dofs]
+    force, inverse = moment + drive, 1 / (ww + own)
+    kept, by_u, by_v = own * inverse, wu * inverse, wv * inverse  # `kept` is 1 - ww * inverse, without its rounding
+    rest = (
+        *(ww * kept, wu * kept, wv * kept, uu - wu * by_u, uv - wu * by_v, vv - wv * by_v),
+        *(moment * kept - ww * drive * inverse, force_x - by_u * force, force_z - by_v * force),
+    )
+    return _Hinge(ww, wu, wv, force, inverse, jnp.stack(rest))
 
 
-def _reduced(whole: jax.Array, hinge: _Hinge) -> jax.Array:
-    """What the parent feels of bodies [9, n, batch] whose hinges are free to give way."""
-    w, u, v, force, inverse = hinge
-    left = jnp.stack([w, w, w, u, u, v, w, u, v])
-    right = jnp.stack([w, u, v, u, v, v, force, force, force])
-    return whole - left * (right * inverse)
+def _about_parent(bodies: jax.Array, offset: jax.Array) -> jax.Array:
+    """Bodies [9, n, batch] about their parents' hinges, from which their own are at an offset [2, n, batch]."""
+    ww, wu, wv, uu, uv, vv, moment, force_x, force_z = bodies
+    x, z = offset
+    to_u, to_v = wu + z * uu - x * uv, wv + z * uv - x * vv
+    turning = ww + z * (wu + to_u) - x * (wv + to_v)
+    return jnp.stack([turning, to_u, to_v, uu, uv, vv, moment + z * force_x - x * force_z, force_x, force_z])
 
 
 def _root_motion(model: PlanarModel, whole: jax.Array, joints: Joints) -> jax.Array:
@@ -170,7 +174,7 @@ def constrained(
         diagonal = joints.inertia + jnp.concatenate([none, held])
         force = joints.force + jnp.concatenate([none, stops.direction * held * stops.reference])
         stiff = bodies + contact_stiffness(touching, start.contact < 0)
-        end = point(*accelerations(model, moving.anchors, stiff, Joints(diagonal, force)))
+        end = point(*accelerations(model, moving.offsets, stiff, Joints(diagonal, force)))
         changed = _any(((end.contact < 0) != (start.contact < 0)) & (touching.strength > 0)) | _any(
             ((end.limit < 0) != (start.limit < 0)) & (stops.strength > 0)
         )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from envs.planar.constraints import Contacts, Limits, contact_forces, contacts, limit_forces, limits
+from envs.planar.constraints import Contacts, Limits, contacts, limits
 from envs.planar.kinematics import Kinematics, kinematics
 from envs.planar.model import PlanarModel
 from envs.planar.solver import Joints, Solution, accelerations, body_inertia, constrained
@@ -37,12 +37,12 @@ def forward(model: PlanarModel, qpos: jax.Array, qvel: jax.Array, drive: jax.Arr
 def time_step(model: PlanarModel, qpos: jax.Array, qvel: jax.Array, drive: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Positions and velocities [V, batch] a time step later, under joint forces `drive`. All in level order."""
     now = forward(model, qpos, qvel, drive)
-    pulled = jnp.concatenate(
-        [now.bodies[:6], now.bodies[6:] + contact_forces(now.touching, now.solution.contact_residuals)]
-    )
-    force = now.smooth.force + limit_forces(now.stops, now.solution.limit_residuals)
-    # The damping of the step's end instead of its beginning: (M + h B) a = forces at the beginning.
-    resisting = now.smooth.inertia + model.timestep * constant(model.joint_damping, qpos)
-    qacc, _ = accelerations(model, now.moving.anchors, pulled, Joints(resisting, force))
+    # The damping of the step's end instead of its beginning: (M + h B) a' = forces = M a, or a' = a less what h B a
+    # brakes. Forces summed anew would have the rounding of a, times stiffness.
+    damping = model.timestep * constant(model.joint_damping, qpos)
+    unpulled = jnp.concatenate([now.bodies[:6], jnp.zeros_like(now.bodies[6:])])
+    braking = Joints(now.smooth.inertia + damping, damping * now.solution.qacc)
+    braked, _ = accelerations(model, now.moving.offsets, unpulled, braking)
+    qacc = now.solution.qacc - braked
     qvel = qvel + model.timestep * qacc
     return qpos + model.timestep * qvel, qvel

@@ -68,25 +68,26 @@ def _stages(
 ) -> tuple[jax.Array, ...]:
     moving, touching, stops, bodies, smooth, solution = forwarded(planar, qpos, qvel, control)
     centre_slot, capsule_slot = _slots(model, planar)
-    hinge_body = np.argsort(model.jnt_bodyid[planar.dofs[2:]])
     joint = np.argsort(planar.dofs)
 
     def accelerated(pulled: jax.Array, force: jax.Array) -> jax.Array:
-        return accelerations(planar, moving.anchors, pulled, Joints(smooth.inertia, force))[0][joint].T
+        return accelerations(planar, moving.offsets, pulled, Joints(smooth.inertia, force))[0][joint].T
 
     at_rest = jnp.concatenate([bodies[:6], jnp.zeros_like(bodies[6:])])
-    distance = moving.end[1] + moving.height - planar.ground - planar.contact_distance[:, None]
+    ends = moving.hinge[:, None] + moving.end
+    points = moving.hinge[:, None] + jnp.stack([touching.x, touching.z])
+    distance = ends[1] + moving.height - planar.ground - planar.contact_distance[:, None]
     touches, held = touching.strength > 0, stops.strength > 0
     along = touching.friction * touching.reference_x
     edges = jnp.stack([touching.reference_z + along, touching.reference_z - along])
     slides = jnp.zeros_like(qpos.T[:2])
     return (
-        jnp.concatenate(moving.anchors, axis=1)[:, hinge_body].T,
-        moving.centre[:, centre_slot].T,
-        moving.end[:, :, capsule_slot].T,
+        moving.hinge[:, centre_slot].T,
+        (moving.hinge + moving.centre)[:, centre_slot].T,
+        ends[:, :, capsule_slot].T,
         accelerated(bodies, jnp.zeros_like(qvel.T)),
         accelerated(at_rest, qvel.T[planar.dofs]),
-        jnp.where(touches, jnp.stack([touching.x, touching.z]), 0.0)[:, :, capsule_slot].T,
+        jnp.where(touches, points, 0.0)[:, :, capsule_slot].T,
         jnp.where(touches, distance, 0.0)[:, capsule_slot].T,
         touching.strength[:, capsule_slot].T,
         jnp.where(touches, edges, 0.0)[:, :, capsule_slot].T,

@@ -22,7 +22,7 @@ def states_of(steps: Steps) -> States:
 
 @pytest.fixture(scope="module")
 def visited():
-    """About `COUNT` time steps of each kind; the last `COUNT` are violent."""
+    """About `COUNT` time steps of each kind."""
     parts = [cheetah_steps(kind, COUNT, seed) for seed, kind in enumerate(KINDS)]
     return Steps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -56,11 +56,7 @@ def errors(qvel, steps: Steps) -> np.ndarray:  # [N]
 def test_velocities_in_single_precision(single, visited):
     error = errors(single.qvel, visited)
     assert np.median(error) < 1e-5
-    assert np.quantile(error[:-COUNT], 0.999) < 1e-3
-    assert error[:-COUNT].max() < 1e-2
-    # Underground and fast, velocities change by 20 to 50 rad/s in a time step, and rounding is in proportion.
-    assert np.quantile(error[-COUNT:], 0.98) < 1e-3
-    assert error.max() < 2e-2
+    assert error.max() < 1e-3
 
 
 def test_far_away_only_x_loses_digits(single, visited):
@@ -79,8 +75,8 @@ def test_a_hundred_thousand_states(kind):
     steps = cheetah_steps(kind, 20_000, seed=100)
     error = errors(one_step(MODEL, states_of(steps), np.float32).qvel, steps)
     assert np.median(error) < 1e-5
-    assert np.quantile(error, 0.98 if kind == "violent" else 0.999) < 1e-3
-    assert error.max() < (2e-2 if kind == "violent" else 1e-2)
+    assert np.quantile(error, 0.999) < 5e-4
+    assert error.max() < 1e-3
     after = one_step(MODEL, states_of(steps), np.float64)
     assert relative_difference(after.qvel, steps.next_qvel).max() < 1e-9
     assert relative_difference(after.qpos, steps.next_qpos).max() < 1e-9
