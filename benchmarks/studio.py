@@ -1,19 +1,20 @@
 """How the studio feels, and what it costs; in a real browser. `make bench-studio` prints it and keeps it.
 
 interaction   from a click on a policy to the page that shows it, with a front of 2,000 policies of three objectives
-question      from the click on a choice to the next question on MountainCar, less the generation's own time
-serving       how much longer the generations of a run take that a page is open on, than those of `jmorl train`
+question      from the click on a choice to the page with the next question on MountainCar, less the generation's own
+              time
+serving       how much longer the generations of a run take in the studio than those of `jmorl train`: with no page, and
+              with one, whose browser runs on the same processors
 """
 
 import json
-import re
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ from jmorl.studio.view import Generation, View
 from tests.studio.browsing import chromium
 
 RESULTS = Path(__file__).parent / "studio.json"
-POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 3
+POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 5
 # Time in the browser, from a click on the n-th row in sight to the first picture that has the row and its card.
 CLICK = """(n) => new Promise((done) => {
   const row = document.querySelectorAll(".policies-row")[n], started = performance.now();
@@ -50,6 +51,18 @@ CLICK = """(n) => new Promise((done) => {
   row.click();
   look();
 })"""
+# The same from a choice to the next question.
+CHOOSE = """(question) => new Promise((done) => {
+  const heading = document.querySelector(".heading"), started = performance.now();
+  const observer = new MutationObserver(() => {
+    if (!heading.textContent.startsWith(question)) return;
+    observer.disconnect();
+    requestAnimationFrame(() => setTimeout(() => done((performance.now() - started) / 1000)));
+  });
+  observer.observe(heading, { characterData: true, childList: true, subtree: true });
+  document.querySelector(".place.focus .choose").click();
+})"""
+SERVED = ("alone", "served", "with a page")
 
 
 class Still(Session):
@@ -135,35 +148,40 @@ def interaction() -> list[float]:
 
 def question(folder: Path) -> list[float]:
     """Seconds between a choice and the next question that were not the generation's own."""
-    waited, started = [], 0.0
+    waited = []
     run = str(folder / "question")
     with served("jmorl.cli", "studio", "--out", run, "--port", str(PORT)), browser_page() as page:
-        for generation in range(1, 6):
-            page.get_by_text(f"Generation {generation}: which of these").wait_for(timeout=300_000)
-            if generation > 1:
-                waited.append(time.perf_counter() - started)
+        page.get_by_text("Generation 1: which of these").wait_for(timeout=300_000)
+        for generation in range(2, 7):
             page.locator(".policies-row").first.click()
-            choose = page.locator(".place.focus").get_by_role("button", name=re.compile("^Choose"))
-            choose.wait_for()
-            started = time.perf_counter()
-            choose.click()
+            page.locator(".place.focus .choose").wait_for()
+            page.wait_for_timeout(1000)
+            waited.append(float(page.evaluate(CHOOSE, f"Generation {generation}: which of these")))
     return (np.array(waited) - _seconds(folder / "question")[: len(waited)]).tolist()
 
 
-def serving(folder: Path) -> tuple[list[float], list[float]]:
-    """Seconds of all generations of a run with an artificial user: trained in the terminal, and with a page open."""
-    alone, watched = [], []
+def serving(folder: Path) -> dict[str, list[float]]:
+    """Seconds of all generations of a run with an artificial user, in each way of `SERVED`; they take turns."""
+    seconds: dict[str, list[float]] = {way: [] for way in SERVED}
     settings = ["--user", "A", "--steps", "1700000"]
     for repeat in range(REPEATS):
-        path = folder / f"alone{repeat}"
-        command = [sys.executable, "-m", "jmorl.cli", "train", "--quiet", "--out", str(path), *settings]
-        subprocess.run(command, check=True)
-        alone.append(float(_seconds(path).sum()))
-        path = folder / f"watched{repeat}"
-        with served("jmorl.cli", "studio", "--out", str(path), "--port", str(PORT), *settings), browser_page() as page:
-            page.get_by_text("The result is policy").wait_for(timeout=600_000)
-        watched.append(float(_seconds(path).sum()))
-    return alone, watched
+        for way in SERVED:
+            path = folder / f"{way}-{repeat}"
+            if way == "alone":
+                command = [sys.executable, "-m", "jmorl.cli", "train", "--quiet", "--out", str(path), *settings]
+                subprocess.run(command, check=True)
+            else:
+                with served("jmorl.cli", "studio", "--out", str(path), "--port", str(PORT), *settings):
+                    _follow(path, with_page=way == "with a page")
+            seconds[way].append(float(_seconds(path).sum()))
+    return seconds
+
+
+def _follow(path: Path, with_page: bool) -> None:
+    """Wait for the end of a run that is being served."""
+    with browser_page() if with_page else nullcontext():
+        while not (path / "result.json").exists():
+            time.sleep(0.5)
 
 
 def _seconds(path: Path) -> np.ndarray:  # [G]
@@ -179,12 +197,13 @@ def main() -> None:
         serve(Still(POLICIES, 3), "127.0.0.1", PORT, None)
         return
     with tempfile.TemporaryDirectory() as folder:
-        clicks, waits, (alone, watched) = interaction(), question(Path(folder)), serving(Path(folder))
+        clicks, waits, seconds = interaction(), question(Path(folder)), serving(Path(folder))
+    shares = {way: statistics.median(seconds[way]) / statistics.median(seconds["alone"]) - 1 for way in SERVED[1:]}
     results = {
         "machine": machine(),
         "interaction_milliseconds": {"median": statistics.median(clicks), "most": max(clicks)},
         "question_seconds": {"median": statistics.median(waits), "most": max(waits)},
-        "serving": {"alone_seconds": alone, "watched_seconds": watched, "share": _share(alone, watched)},
+        "serving": {"seconds": seconds, "share": shares},
     }
     RESULTS.write_text(json.dumps(results, indent=2) + "\n")
     table = Table("what", "median", "most")
@@ -192,12 +211,9 @@ def main() -> None:
     table.add_row(
         "choice to next question, besides training", f"{statistics.median(waits):.2f} s", f"{max(waits):.2f} s"
     )
-    table.add_row("training, with a page open", f"{100 * _share(alone, watched):+.1f} %", "")
+    for way, share in shares.items():
+        table.add_row(f"training, {way}", f"{100 * share:+.1f} %", "")
     Console().print(table)
-
-
-def _share(alone: list[float], watched: list[float]) -> float:
-    return statistics.median(watched) / statistics.median(alone) - 1
 
 
 if __name__ == "__main__":

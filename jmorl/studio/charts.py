@@ -84,6 +84,8 @@ class Charts:
 
 
 def _draw(chart: ui.echart, options: dict[str, Any]) -> None:
+    if chart.options == options:  # painting takes a processor that may be training
+        return
     chart.options.clear()
     chart.options.update(options)
     chart.update()

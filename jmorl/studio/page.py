@@ -20,8 +20,9 @@ from jmorl.studio.navigation_panel import NavigationPanel
 from jmorl.studio.policies import PolicyTable
 from jmorl.studio.question_bar import QuestionBar
 from jmorl.studio.session import Session
+from jmorl.studio.view import View
 
-REFRESH_SECONDS, TICK_SECONDS = 0.1, 0.5
+REFRESH_SECONDS, TICK_SECONDS = 0.1, 1.0
 STYLE = Path(__file__).parent / "studio.css"
 
 
@@ -31,6 +32,7 @@ class Page:
     def __init__(self, session: Session):
         self.session = session
         self.view, self.desk, self.dialogue = session.view, session.desk, session.dialogue
+        self.settled: Question | None = None  # answered, and whoever sits at this tab knows
         ui.add_css(STYLE)
         ui.colors(primary=BLUE, negative=RED)
         with ui.element("main").classes("studio") as self.root:
@@ -49,6 +51,8 @@ class Page:
         """Bring up to date what is not."""
         view, desk, dialogue = self.session.view, self.session.desk, self.session.dialogue
         other_run = view.path != self.view.path
+        if not other_run and len(view.choices) > len(self.view.choices):
+            self._tell_of_answer(self.view.question, view)
         new_view, new_desk, new_dialogue = view is not self.view, desk is not self.desk, dialogue is not self.dialogue
         self.view, self.desk, self.dialogue = view, desk, dialogue
         if other_run:
@@ -111,8 +115,15 @@ class Page:
         self.refresh()
 
     def _answer(self, question: Question, answer: Answer) -> None:
+        self.settled = question
         if not self.session.answer(question, answer):
             ui.notify("This question is already answered, in another tab; nothing has changed.", type="warning")
+
+    def _tell_of_answer(self, question: Question | None, view: View) -> None:
+        """That the question this tab shows was answered elsewhere. A click on its way here would come to nothing."""
+        if question and question is not self.settled and view.previous:
+            self.settled = question
+            ui.notify(f"Policy {view.previous.id} was chosen, in another tab.", type="warning")
 
     def _show_all(self) -> None:
         for part in (self.question_bar, self.charts, self.table, self.history, self.navigation, self.cards):

@@ -8,6 +8,7 @@ const HOLD = 1.5; // seconds on the last frame, before all begin again
 
 const clock = (window.jmorlClock ??= startClock());
 
+// It ticks only while there is something to play, or after `wake`: drawing takes a processor that may be training.
 function startClock() {
   const clock = {
     time: 0,
@@ -16,25 +17,40 @@ function startClock() {
     get duration() {
       return Math.max(0, ...[...this.shown].map((each) => each.duration()));
     },
+    wake() {
+      if (waiting) return;
+      waiting = true;
+      last = performance.now();
+      requestAnimationFrame(tick);
+    },
+    play(playing) {
+      clock.playing = playing;
+      clock.wake();
+    },
   };
-  let last = performance.now();
+  let waiting = false, last = 0;
   const tick = (now) => {
-    if (clock.playing && clock.duration) {
-      clock.time += (now - last) / 1000;
+    const goesOn = clock.playing && clock.duration > 0;
+    if (goesOn) {
+      clock.time += Math.max(0, now - last) / 1000;
       if (clock.time > clock.duration + HOLD) clock.time = 0;
     }
     last = now;
     clock.shown.forEach((each) => each.draw());
-    requestAnimationFrame(tick);
+    waiting = goesOn;
+    if (goesOn) requestAnimationFrame(tick);
   };
-  requestAnimationFrame(tick);
   window.addEventListener("keydown", (event) => {
     if (event.key === " " && event.target === document.body) {
-      clock.playing = !clock.playing;
+      clock.play(!clock.playing);
       event.preventDefault();
     }
   });
   return clock;
+}
+
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
 }
 
 function trace(pen, shape, place, scale) {
@@ -91,27 +107,33 @@ export default {
   async mounted() {
     this.shown = { duration: () => this.duration(), draw: () => this.draw() };
     clock.shown.add(this.shown);
+    clock.wake();
     if (this.controls) return;
+    this.observer = new ResizeObserver(clock.wake);
+    this.observer.observe(this.$refs.canvas);
     this.message = "Recording an episode …";
     try {
       const response = await fetch(this.src);
       if (!response.ok) throw new Error((await response.json().catch(() => ({}))).detail ?? "the server failed");
       this.episode = Object.freeze(await response.json());
       this.message = "";
+      clock.wake();
     } catch (error) {
       this.message = `No playback: ${error.message}`;
     }
   },
   beforeUnmount() {
     clock.shown.delete(this.shown);
+    this.observer?.disconnect();
+    clock.wake();
   },
   methods: {
     toggle() {
-      clock.playing = !clock.playing;
+      clock.play(!clock.playing);
     },
     seek(time) {
       clock.time = Number(time);
-      clock.playing = false;
+      clock.play(false);
     },
     duration() {
       return this.episode ? (this.episode.frames.length - 1) * this.episode.seconds : 0;
@@ -120,15 +142,15 @@ export default {
       if (this.controls) {
         this.playing = clock.playing;
         this.length = clock.duration;
-        const time = Math.min(clock.time, clock.duration);
-        this.$refs.slider.value = time;
-        this.$refs.time.textContent = `${time.toFixed(1)} of ${clock.duration.toFixed(1)} s`;
+        const time = Math.min(clock.time, clock.duration).toFixed(1); // in tenths: no repainting in between
+        if (Number(this.$refs.slider.value) !== Number(time)) this.$refs.slider.value = time;
+        write(this.$refs.time, `${time} of ${clock.duration.toFixed(1)} s`);
       } else if (this.episode && this.$refs.canvas) {
         const { frames, seconds } = this.episode;
         const frame = frames[Math.min(Math.floor(clock.time / seconds), frames.length - 1)];
         this.drawFrame(frame);
         this.$refs.totals?.forEach((cell, index) => {
-          cell.textContent = frame.totals[index].toFixed(this.decimals[index]).replace("-", "−");
+          write(cell, frame.totals[index].toFixed(this.decimals[index]).replace("-", "−"));
         });
       }
     },

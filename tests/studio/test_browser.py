@@ -165,14 +165,18 @@ def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, small, tm
             tab.asked(1)
         policy = tabs[0].look_at(0)
         tabs[1].card(policy).wait_for()  # both see the same
-        # Both clicks are on their way before either tab can know of the other's.
         buttons = [tab.card(policy).get_by_role("button", name="Choose").element_handle() for tab in tabs]
         for button in buttons:
             button.evaluate("(button) => button.click()")
-        tabs[1].page.get_by_text("already answered").wait_for()
+        # Whether the second click was on its way before its tab knew of the first or not.
+        tabs[1].page.get_by_text("in another tab").wait_for()
         for tab in tabs:
             tab.asked(2)
         assert [each["generation"] for each in decisions(path)] == [1]
+        tabs[0].choose(0)
+        tabs[1].page.get_by_text("was chosen, in another tab").wait_for()  # who has not clicked is told, too
+        tabs[1].asked(3)
+        assert not tabs[0].page.get_by_text("in another tab").count()
 
 
 def test_the_keyboard_is_enough(browser, small, tmp_path):
