@@ -5,12 +5,12 @@
                                                                 a variant of the preset, as its table has them
 
 For each seed one PGMORL run, judged for every user, and one interactive run for each user. Everything is in raw units:
-mean undiscounted returns of deterministic episodes of 1,000 steps, 50 seconds. Reference point (-100, -6000).
+mean undiscounted returns of deterministic episodes of 1,000 steps, 50 seconds. Reference point (-100, -6000). Runs are
+made as those of `jmorl paper`, and those that it has made already are not made again.
 """
 
 import argparse
 import json
-import time
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +22,17 @@ from benchmarks.arms import add_arms, arms
 from jmorl.config import Config
 from jmorl.decision.utility import USERS
 from jmorl.learning.devices import use_all_cpu_cores
-from jmorl.run import Compiled, GenerationFinished, run
+from jmorl.paper.analysis import generations_within, greatest_utility
+from jmorl.paper.plan import CHEETAH, ITEMS, USER_STEPS, Cell, Plan
+from jmorl.paper.record import RunRecord, read_record
+from jmorl.paper.runner import Places, make, missing
+from jmorl.search.pareto import hypervolume
 
-ENVIRONMENT = "mo-halfcheetah-v5"
 STEPS_OF_AN_EPISODE = 1000
 RUNNING = 1.0  # m/s: what is slower is not called running
-WEIGHTS = np.array(list(USERS.values()))  # [3, 2]
 RESULT = Path(__file__).with_name("cheetah.json")
+PAPER = Places(Path(__file__).with_name("paper") / "records", Path("runs/paper"))
+VARIANTS = Places(Path("runs/cheetah/records"), Path("runs/cheetah/work"))
 
 
 def main() -> None:
@@ -38,8 +42,8 @@ def main() -> None:
     options = parser.parse_args()
     use_all_cpu_cores()
     rows: list[dict[str, Any]] = []
-    for config in arms(options, ENVIRONMENT):
-        rows.append(_judged(config))
+    for config in arms(options, CHEETAH):
+        rows.append(_judged(_record(config)))
         print(json.dumps({name: rows[-1][name] for name in ("method", "user", "seed", "utility")}), flush=True)
         report = {"preset": options.preset, "set": options.set, "rows": rows}
         options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
@@ -47,30 +51,44 @@ def main() -> None:
         Console().print(table)
 
 
-def _judged(config: Config) -> dict[str, Any]:
-    """One run: what its front is worth at the end, and its curve over the generations."""
-    curve: list[dict[str, Any]] = []
-    wall = cpu = 0.0
-    for event in run(config):
-        if isinstance(event, Compiled):
-            wall, cpu = time.perf_counter(), time.process_time()
-        if isinstance(event, GenerationFinished):
-            values = event.state.archive.values
-            point = {
-                "steps": event.steps,
-                "seconds": round(time.perf_counter() - wall, 1),
-                "cpu_seconds": round(time.process_time() - cpu, 1),
-                "hypervolume": round(event.front.hypervolume),
-                "utility": (values @ WEIGHTS.T).max(axis=0).round(1).tolist(),
-            }
-            curve.append(point)
+def _record(config: Config) -> RunRecord:
+    """The run with this config: the paper's, if it is one of them."""
+    plan, item = Plan(), ITEMS["fig7"]
+    if config.method == "pgmorl":
+        paper = plan.pgmorl(item, "raw", config.seed)
+    else:
+        paper = plan.interactive(item, "raw", config.user, config.seed)
+    same = {"steps": paper.config.steps, "checkpoints": paper.config.checkpoints.model_dump()}
+    if config.replace(**same).digest() == paper.config.digest():
+        cell, places = paper, PAPER
+    else:
+        cell, places = Cell(config.digest(), config), VARIANTS
+    return make(cell, places, lambda *_: None) if missing([cell], places) else read_record(places.record(cell))
+
+
+def _judged(record: RunRecord) -> dict[str, Any]:
+    """What a run's front is worth after so many steps, and its curve over the generations."""
+    steps = USER_STEPS[CHEETAH]
+    utilities = [greatest_utility(record, weights, steps).round(1).tolist() for weights in USERS.values()]
+    reference = np.array(record.config["reference_point"])
+    curve = []
+    for number in range(generations_within(record, steps)):
+        values = record.values[list(record.generations[number].front)]
+        point = {
+            "steps": record.generations[number].steps,
+            "seconds": round(float(record.seconds[number]), 1),
+            "hypervolume": round(hypervolume(values, reference)),
+            "utility": [curve_of_user[number] for curve_of_user in utilities],
+        }
+        curve.append(point)
     speed = values[:, 0] / STEPS_OF_AN_EPISODE
     runners = values[speed >= RUNNING]
     cheapest = runners[np.argmax(runners[:, 1])] if len(runners) else None
+    interactive = record.config["method"] == "interactive"
     return {
-        "method": config.method,
-        "user": config.user if config.method == "interactive" else None,
-        "seed": config.seed,
+        "method": record.config["method"],
+        "user": record.config["user"] if interactive else None,
+        "seed": record.config["seed"],
         "hypervolume": curve[-1]["hypervolume"],
         "utility": dict(zip(USERS, curve[-1]["utility"], strict=True)),
         "fastest_metres_per_second": round(float(speed.max()), 2),

@@ -3,10 +3,11 @@
 interaction   from a click on a policy to the page that shows it, with a front of 2,000 policies of three objectives
 question      from the click on a choice to the page with the next question on MountainCar, less the generation's own
               time
-serving       how much longer the generations of a run take in the studio than those of `jmorl train`: with no page, and
-              with one, whose browser runs on the same processors
+serving       how much longer the generations of a run take in the studio than those of `jmorl train`: with no page,
+              with one, whose browser runs on the same processors, and with a policy playing on it
 """
 
+import argparse
 import json
 import statistics
 import subprocess
@@ -36,7 +37,7 @@ from jmorl.studio.view import Generation, View
 from tests.studio.browsing import chromium
 
 RESULTS = Path(__file__).parent / "studio.json"
-POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 5
+POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 4
 # Time in the browser, from a click on the n-th row in sight to the first picture that has the row and its card.
 CLICK = """(n) => new Promise((done) => {
   const row = document.querySelectorAll(".policies-row")[n], started = performance.now();
@@ -62,7 +63,7 @@ CHOOSE = """(question) => new Promise((done) => {
   observer.observe(heading, { characterData: true, childList: true, subtree: true });
   document.querySelector(".place.focus .choose").click();
 })"""
-SERVED = ("alone", "served", "with a page")
+SERVED = ("alone", "served", "with a page", "with a policy playing")
 
 
 class Still(Session):
@@ -172,14 +173,16 @@ def serving(folder: Path) -> dict[str, list[float]]:
                 subprocess.run(command, check=True)
             else:
                 with served("jmorl.cli", "studio", "--out", str(path), "--port", str(PORT), *settings):
-                    _follow(path, with_page=way == "with a page")
+                    _follow(path, with_page=way.startswith("with"), playing=way == SERVED[-1])
             seconds[way].append(float(_seconds(path).sum()))
     return seconds
 
 
-def _follow(path: Path, with_page: bool) -> None:
+def _follow(path: Path, with_page: bool, playing: bool) -> None:
     """Wait for the end of a run that is being served."""
-    with browser_page() if with_page else nullcontext():
+    with browser_page() if with_page else nullcontext() as page:
+        if page and playing:
+            page.locator(".policies-row").first.click(timeout=300_000)
         while not (path / "result.json").exists():
             time.sleep(0.5)
 
@@ -191,10 +194,16 @@ def _seconds(path: Path) -> np.ndarray:  # [G]
 
 
 def main() -> None:
-    if sys.argv[1:] == ["still"]:
-        from jmorl.studio.server import serve
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="?", choices=["still"], help="serve a question about many policies, and no more")
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, default=PORT)
+    options = parser.parse_args()
+    if options.what == "still":
+        from jmorl.studio.server import address, serve
 
-        serve(Still(POLICIES, 3), "127.0.0.1", PORT, None)
+        print(f"The studio is at {address(options.host, options.port, None)}", flush=True)
+        serve(Still(POLICIES, 3), options.host, options.port, None)
         return
     with tempfile.TemporaryDirectory() as folder:
         clicks, waits, seconds = interaction(), question(Path(folder)), serving(Path(folder))

@@ -81,6 +81,8 @@ class Card:
                     ui.label(objective.label)
                 with ui.element("dd"):
                     ui.label(score)
+        if policy.raw is not None:
+            ui.label(words.raw_returns(view, policy)).classes("consequences")
         self.consequences = ui.label().classes("consequences")
         self.choose = ui.button(on_click=lambda: page.choose(policy.id)).props("no-caps dense").classes("choose")
 

@@ -42,7 +42,7 @@ class Charts:
     def show(self) -> None:
         """Everything anew."""
         view = self.page.view
-        _draw(self.front, front_options(view, self.axes))
+        _draw(self.front, front_options(view, self.axes, self._asked()))
         _draw(self.parallel, parallel_options(view))
         _draw(self.curves, curve_options(view))
         self.show_marks()

@@ -9,6 +9,7 @@ from jmorl.decision.protocol import PointQuestion
 from jmorl.display.limits import around, core, inside
 from jmorl.display.text import plural
 from jmorl.search.bounds import within
+from jmorl.steering import Prospect
 from jmorl.studio.desk import Desk
 from jmorl.studio.looks import (
     BLUE,
@@ -34,9 +35,9 @@ PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "b
 MANY = 300  # policies; more are drawn smaller
 
 
-def front_options(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
     """What stays while policies are looked at, with the objectives `axes` to the right and upwards."""
-    limits = _limits(view)
+    limits = _limits(view, asked)
     far_out = int((~inside(view.values, limits)).sum()) if view.front else 0
     note = f"{plural(far_out, 'policy')} far out, in the table only" if far_out else ""
     return {
@@ -55,13 +56,14 @@ def front_options(view: View, axes: tuple[int, int]) -> dict[str, Any]:
 
 def front_marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
     """What follows from what is laid out: a chart to put over the other, so that only little is drawn anew."""
-    limits = _limits(view)
-    bounds = desk.prospect.bounds if desk.prospect else np.full(len(view.objectives), -np.inf)
+    limits = _limits(view, asked)
+    prospect = desk.prospect if view.question else None  # what is answered brings nothing any more
+    bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
     return {
         **_frame(view, axes, limits, visible=False),
         "series": [
             _area("bounds that would follow", bounds, axes, limits, PROPOSED),
-            _expected(desk, axes),
+            _expected(prospect, axes),
             _wanted(view, desk, axes),
             _laid_out(view, desk, axes),
             _points(asked, axes),
@@ -71,6 +73,7 @@ def front_marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuest
 
 def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
     """Where both charts have their axes."""
+    visible = visible and bool(view.front)
     x, y = (
         _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
     )
@@ -78,16 +81,19 @@ def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool)
     return {**base(), "grid": grid, "xAxis": x, "yAxis": y}
 
 
-def _limits(view: View) -> np.ndarray:
-    """Of the axes, [2, M]: around the front without what is far out, and around bounds and choices."""
+def _limits(view: View, asked: PointQuestion | None) -> np.ndarray:
+    """Of the axes, [2, M]: around front and choices without what is far out, bounds, and what E-NAUTILUS shows."""
     if not view.front:
         return np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
+    seen = np.vstack([view.values, *(values for _, values in view.choices)])
     shown = [
-        view.values[core(view.values)],
+        seen[core(seen)],
         *(choice.values[None] for choice in (view.previous, view.result) if choice),
     ]
     if np.isfinite(view.bounds).all():
         shown.append(view.bounds[None])
+    if asked:
+        shown.append(np.stack([asked.state.point, *(point.value for point in asked.points)]))
     return around(np.concatenate(shown))
 
 
@@ -155,7 +161,7 @@ def _ghosts(view: View, axes: tuple[int, int]) -> dict[str, Any]:
 def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
     """The choices so far, each with the generation it was made for."""
     data = [
-        {"value": [0, *plain(values)[0], ""], "label": {"formatter": str(generation)}}
+        {"value": [0, *plain(values)[0], ""], "label": {"formatter": _when(view, generation)}}
         for generation, values in view.choices
     ]
     return {
@@ -168,6 +174,11 @@ def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
         "label": {"show": True, "position": "left", "fontSize": 10, "color": INK},
         "labelLayout": {"hideOverlap": True},
     }
+
+
+def _when(view: View, generation: int) -> str:
+    """When a choice was made: before which generation, or after the last one."""
+    return "end" if view.result and view.generations and generation > view.generations[-1].number else str(generation)
 
 
 def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
@@ -189,8 +200,8 @@ def _area(
     return {"type": "scatter", "id": name, "name": name, "data": [], "silent": True, "markArea": area}
 
 
-def _expected(desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
-    expected = desk.prospect.expected if desk.prospect else np.zeros((0, 0))
+def _expected(prospect: Prospect | None, axes: tuple[int, int]) -> dict[str, Any]:
+    expected = prospect.expected if prospect else np.zeros((0, 0))
     data = [[0, *values, ""] for values in plain(expected)] if len(expected) else []
     looks = {"symbol": "path://M4 0h2v4h4v2h-4v4h-2v-4h-4v-2h4z", "symbolSize": 8, "itemStyle": {"color": GREEN}}
     return _scatter("expected by the model", data, axes, silent=True, z=2, **looks)

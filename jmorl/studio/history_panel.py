@@ -1,5 +1,6 @@
 """The history on the page: a run, its branches, every choice, and the way back."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nicegui import ui
@@ -8,9 +9,12 @@ from jmorl.decision.records import DecisionRecord
 from jmorl.display.text import plural, values_in_words
 from jmorl.studio import words
 from jmorl.studio.history import Branch
+from jmorl.studio.view import View
 
 if TYPE_CHECKING:
     from jmorl.studio.page import Page
+
+LISTED = 20  # policies that a question showed, at most
 
 
 class HistoryPanel:
@@ -18,12 +22,17 @@ class HistoryPanel:
 
     def __init__(self, page: "Page"):
         self.page = page
+        self.shown: tuple[object, ...] = ()
         self.tree = ui.element("div").classes("history").props('role="tree" aria-label="History"')
 
     def show(self) -> None:
+        shown = self.page.session.history(), self.page.view.run, _open_question(self.page.view)
+        if shown == self.shown:  # nobody shall lose a button that they are about to press
+            return
+        self.shown = shown
         self.tree.clear()
         with self.tree:
-            for branch in self.page.session.history():
+            for branch in shown[0]:
                 self._add_branch(branch)
 
     def _add_branch(self, branch: Branch) -> None:
@@ -41,20 +50,37 @@ class HistoryPanel:
                 self._add_step(branch, step)
             if is_open and view.question:
                 with ui.element("div").classes("step"):
-                    ui.label(f"{_title(view.question.purpose, view.question.generation)}: open").classes("open-step")
+                    ui.label(f"{_open_question(view)}: open").classes("open-step")
 
     def _add_step(self, branch: Branch, step: DecisionRecord) -> None:
-        view = self.page.view
-        values = words.minus(values_in_words(step.values, view.objectives, words.formats_of(view)))
+        more = f", then {step.generations} generations" if step.generations > 1 else ", and stop" if step.stop else ""
+        text = f"{_title(step.purpose, step.generation)}: policy {step.policy} ({self._values(step.values)})"
+        shown = [f"policy {each.policy}: {self._values(each.values)}" for each in step.shown[:LISTED]]
+        if len(step.shown) > LISTED:
+            shown.append(f"and {len(step.shown) - LISTED} more")
         with ui.element("div").classes("step"):
-            chosen = f"{_title(step.purpose, step.generation)}: policy {step.policy} ({values})"
-            more = (
-                f", then {step.generations} generations" if step.generations > 1 else ", and stop" if step.stop else ""
-            )
-            ui.label(f"{chosen} of {plural(len(step.shown), 'policy')}{more}")
-            if step.generation - 1 in branch.checkpoints:
-                back = ui.button("Choose otherwise", on_click=lambda: self.page.step_back(branch.run, step.generation))
-                back.props("no-caps dense flat size=sm")
+            with ui.label(f"{text} of {plural(len(step.shown), 'policy')}{more}"):
+                if shown:
+                    ui.tooltip("\n".join(shown)).classes("shown")
+            self._add_way_back(branch, step.generation)
+        for generation in range(step.generation + 1, step.generation + step.generations):
+            if generation - 1 in branch.checkpoints:
+                with ui.element("div").classes("step"):
+                    ui.label(f"Generation {generation}: not asked").classes("branch-state")
+                    self._add_way_back(branch, generation)
+
+    def _add_way_back(self, branch: Branch, generation: int) -> None:
+        if generation - 1 in branch.checkpoints:
+            back = ui.button("Choose otherwise", on_click=lambda: self.page.step_back(branch.run, generation))
+            back.props("no-caps dense flat size=sm")
+
+    def _values(self, values: Sequence[float]) -> str:
+        view = self.page.view
+        return words.minus(values_in_words(values, view.objectives, words.formats_of(view)))
+
+
+def _open_question(view: View) -> str:
+    return _title(view.question.purpose, view.question.generation) if view.question else ""
 
 
 def _title(purpose: str, generation: int) -> str:

@@ -20,6 +20,14 @@ TOOLTIP_TEXT = """
   return [`policy ${p.value[0]}`, ...values, p.value[p.value.length - 1]].filter(Boolean).join("\\n");
 }
 """
+# The same for lines of parallel coordinates, [values..., policy], whose dimensions have no names: they come first.
+LINE_TOOLTIP = """
+(p) => {
+  const names = %s;
+  const number = (v) => v.toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
+  return [`policy ${p.data[names.length]}`, ...names.map((name, i) => `${name}  ${number(p.data[i])}`)].join("\\n");
+}
+"""
 
 
 def base() -> dict[str, Any]:

@@ -23,11 +23,17 @@ class NavigationPanel:
 
     def __init__(self, page: "Page"):
         self.page = page
+        self.shown: tuple[Dialogue | None, bool] | None = None  # the dialogue, and whether its end can be chosen
         self.body = ui.element("div").classes("navigation")
 
     def show(self) -> None:
-        self.body.clear()
         dialogue = self.page.dialogue
+        chosen = dialogue.chosen if dialogue else None
+        choosable = chosen is not None and self.page.view.choosable(chosen.id)
+        if self.shown and self.shown[0] is dialogue and self.shown[1] == choosable:
+            return  # nobody shall lose what they are about to press, or have typed
+        self.shown = dialogue, choosable
+        self.body.clear()
         with self.body:
             if dialogue is None:
                 self._add_beginning()
@@ -51,7 +57,8 @@ class NavigationPanel:
         state = question.state
         ui.label(
             f"On the front after generation {question.generation}: {int(state.reachable.sum())} of "
-            f"{plural(len(question.front), 'policy')} reachable. Which point do you prefer?"
+            f"{plural(len(question.front), 'policy')} reachable. Which point do you prefer? A bar goes from the worst "
+            "to the best value that stays reachable from it."
         ).classes("explanation")
         for number, point in enumerate(question.points, start=1):
             self._add_point(dialogue, question, number, point)

@@ -11,6 +11,7 @@ from nicegui.events import KeyEventArguments
 
 from jmorl.decision.protocol import Answer, Question
 from jmorl.display.text import objective_label
+from jmorl.storage.checkpoints import CheckpointError
 from jmorl.studio import words
 from jmorl.studio.cards import Cards
 from jmorl.studio.charts import Charts
@@ -62,7 +63,9 @@ class Page:
             self.charts.show()
             self.table.show()
             self.history.show()
-        elif new_desk or new_dialogue:
+        elif new_dialogue:
+            self.charts.show()
+        elif new_desk:
             self.charts.show_marks()
         if new_view or new_desk:
             self.question_bar.show()
@@ -73,7 +76,7 @@ class Page:
         if new_view or self.session.clock() >= self.next_tick:
             self._tick()
 
-    def choose(self, policy: int, stop: bool = False) -> None:
+    def choose(self, policy: int) -> None:
         """Answer the open question as this tab shows it."""
         question = self.view.question
         if question is None:
@@ -81,9 +84,19 @@ class Page:
         elif not self.view.choosable(policy):
             ui.notify(f"Policy {policy} is not among those you can choose from.")
         else:
-            self._answer(question, Answer(policy, stop, 1 if stop else self.question_bar.generations))
+            self.answer(question, Answer(policy, generations=self.question_bar.generations))
+
+    def answer(self, question: Question, answer: Answer) -> None:
+        """Answer a question that this tab has shown; a second click does nothing more."""
+        if question is self.settled:
+            return
+        self.settled = question
+        if not self.session.answer(question, answer):
+            ui.notify("This question is already answered, in another tab; nothing has changed.", type="warning")
 
     def look_at(self, policy: int) -> None:
+        if not self.view.policy(policy):
+            ui.notify(f"Policy {policy} is no longer in the front.")
         self.session.look_at(policy)
         self.refresh()
 
@@ -110,14 +123,9 @@ class Page:
             ui.notify(f"{doing} after this generation …" if training else f"{doing} …")
             try:
                 await run.io_bound(command, *arguments)
-            except ValueError as error:
+            except (ValueError, OSError, CheckpointError) as error:
                 ui.notify(str(error), type="negative", multi_line=True)
         self.refresh()
-
-    def _answer(self, question: Question, answer: Answer) -> None:
-        self.settled = question
-        if not self.session.answer(question, answer):
-            ui.notify("This question is already answered, in another tab; nothing has changed.", type="warning")
 
     def _tell_of_answer(self, question: Question | None, view: View) -> None:
         """That the question this tab shows was answered elsewhere. A click on its way here would come to nothing."""
@@ -187,11 +195,13 @@ class Page:
 
     def _press(self, event: KeyEventArguments) -> None:
         modified = event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta
-        if not event.action.keydown or modified or self.keys.value:
+        if not event.action.keydown or modified or self.keys.value or self.question_bar.stopping.value:
             return
         key, focus = event.key, self.desk.focus
         if key.arrow_left or key.arrow_right:
             self._look_along(1 if key.arrow_right else -1)
+        elif event.action.repeat:  # a key that is held down answers once
+            return
         elif key.number and key.number <= len(self.view.objectives):
             self.more_of(key.number - 1)
         elif key == "?":

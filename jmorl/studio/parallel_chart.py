@@ -1,5 +1,6 @@
 """The front as lines, one for each policy, across an axis for each objective: for any number of them."""
 
+import json
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from jmorl.display.limits import around
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
 from jmorl.studio.desk import Desk
-from jmorl.studio.looks import BLUE, GREY, INK, LETTER_COLOURS, PALE, TEXT, base, plain
+from jmorl.studio.looks import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
 from jmorl.studio.view import View
 
 
@@ -47,17 +48,22 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
     """Where both charts have their axes."""
     shown = np.concatenate([view.values, view.bounds[None]]) if _bounded(view) else view.values
     limits = around(shown) if len(shown) else np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
-    look = {
-        "nameTextStyle": TEXT,
-        "nameGap": 12,
-        "axisLabel": {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False},
-        "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
-        "axisTick": {"show": visible},
-    }
-    names = [f"↑ {objective_label(objective)}" if visible else "" for objective in view.objectives]
+    visible = visible and bool(view.front)
+    text = {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False}
     axes = [
-        {"dim": index, "name": name, "min": float(low), "max": float(high), **look}
-        for index, (name, low, high) in enumerate(zip(names, *limits, strict=True))
+        {
+            "dim": index,
+            "name": f"↑ {objective_label(objective)}" if visible else "",
+            "nameTextStyle": TEXT,
+            "nameGap": 12,
+            "min": float(low),
+            "max": float(high),
+            # The first axis has its numbers on its left, where no lines are.
+            "axisLabel": {**text, "inside": index == 0},
+            "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
+            "axisTick": {"show": visible, "inside": index == 0},
+        }
+        for index, (objective, low, high) in enumerate(zip(view.objectives, *limits, strict=True))
     ]
     return {**base(), "parallel": {"left": 70, "right": 90, "top": 34, "bottom": 14}, "parallelAxis": axes}
 
@@ -74,7 +80,8 @@ def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, An
     ]
     opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
     look = {"color": colour, "width": 1.2, "opacity": opacity}
-    return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": look, "z": 2}
+    tooltip = {":formatter": LINE_TOOLTIP % json.dumps([objective_label(each) for each in view.objectives])}
+    return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": look, "tooltip": tooltip, "z": 2}
 
 
 def _bounds(view: View) -> dict[str, Any]:

@@ -31,6 +31,7 @@ function startClock() {
   let waiting = false, last = 0;
   const tick = (now) => {
     const goesOn = clock.playing && clock.duration > 0;
+    if (!clock.duration) clock.time = 0;
     if (goesOn) {
       clock.time += Math.max(0, now - last) / 1000;
       if (clock.time > clock.duration + HOLD) clock.time = 0;
@@ -41,7 +42,7 @@ function startClock() {
     if (goesOn) requestAnimationFrame(tick);
   };
   window.addEventListener("keydown", (event) => {
-    if (event.key === " " && event.target === document.body) {
+    if (event.key === " " && !event.target.closest("a, button, input, textarea, select, [role=tab], [role=dialog]")) {
       clock.play(!clock.playing);
       event.preventDefault();
     }
@@ -91,7 +92,7 @@ export default {
   template: `
     <div v-if="controls" class="player-controls">
       <button type="button" :aria-label="playing ? 'Pause' : 'Play'" @click="toggle">{{ playing ? "❚❚" : "▶" }}</button>
-      <input type="range" min="0" :max="length" step="any" ref="slider" aria-label="Time of the playback"
+      <input type="range" min="0" :max="length" step="0.1" ref="slider" aria-label="Time of the playback"
              @input="seek($event.target.value)">
       <span ref="time"></span>
     </div>
@@ -142,6 +143,7 @@ export default {
       if (this.controls) {
         this.playing = clock.playing;
         this.length = clock.duration;
+        this.$refs.slider.max = clock.duration;
         const time = Math.min(clock.time, clock.duration).toFixed(1); // in tenths: no repainting in between
         if (Number(this.$refs.slider.value) !== Number(time)) this.$refs.slider.value = time;
         write(this.$refs.time, `${time} of ${clock.duration.toFixed(1)} s`);

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
+from jmorl.decision.protocol import Answer, Question
 from jmorl.studio import words
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ class QuestionBar:
 
     def __init__(self, page: "Page"):
         self.page = page
+        self.question: Question | None = None  # that is shown
+        self.ending: Answer | None = None  # to it, if it is confirmed
         self.generations = 1  # to go on for before the next question
         self.shown: tuple[object, ...] = ()  # what the buttons are for
         with ui.element("section").classes("bar question").props('aria-label="The question"'):
@@ -29,11 +32,14 @@ class QuestionBar:
     def show(self) -> None:
         view, desk = self.page.view, self.page.desk
         self.heading.set_text(words.heading(view, desk))
+        if view.question is not self.question:
+            self.question = view.question
+            self.generations = 1  # of silence, anew for each question
+            self.stopping.close()
         shown = id(view.question), id(view.result), view.timeline is None, bool(view.front), desk.more_of, view.run
         if shown == self.shown:  # nobody shall lose a button that they are about to press
             return
         self.shown = shown
-        self.generations = 1  # of silence, anew for each question
         self.buttons.clear()
         with self.buttons:
             if view.front:
@@ -51,7 +57,7 @@ class QuestionBar:
             self.page.choose(self.page.view.previous.id)
 
     def _add_more(self) -> None:
-        ui.label("More of")
+        ui.label("Better in")
         for index, objective in enumerate(self.page.view.objectives):
             pressed = self.page.desk.more_of == index
             button = ui.button(objective.label, on_click=lambda index=index: self.page.more_of(index))
@@ -91,17 +97,18 @@ class QuestionBar:
 
     def _ask_to_stop(self) -> None:
         policy = self._candidate()
-        if policy is None:
-            ui.notify("Look at the policy first that shall be the result.")
+        if policy is None or not self.page.view.choosable(policy):
+            ui.notify("Look at the policy first that shall be the result, one that can be chosen.")
             return
+        self.ending = Answer(policy, stop=True)
         self.stop_text.set_text(f"End the run here, with policy {policy} as its result?")
         self.stopping.open()
 
     def _stop(self) -> None:
+        """Just what was confirmed, wherever the focus is now; the dialog does not outlive its question."""
         self.stopping.close()
-        policy = self._candidate()
-        if policy is not None:
-            self.page.choose(policy, stop=True)
+        if self.question and self.ending:
+            self.page.answer(self.question, self.ending)
 
     async def _go_on(self) -> None:
         await self.page.switch(self.page.view.run)

@@ -1,5 +1,7 @@
 """The server of the studio: the page, and the files that it asks for."""
 
+import asyncio
+import logging
 import platform
 import socket
 import threading
@@ -46,6 +48,7 @@ def address(host: str, port: int, token: str | None) -> str:
 def serve(session: Session, host: str, port: int, token: str | None) -> None:
     """Serve the page, in a thread of its own, until something is raised here: signals are for the caller to hear."""
     app.add_middleware(Guard, host=host, token=token)
+    logging.getLogger("uvicorn.error").addFilter(is_trouble)
     _add_files(session)
 
     @ui.page("/")
@@ -60,6 +63,12 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
         if app.is_started:
             app.shutdown()
             serving.join()
+
+
+def is_trouble(record: logging.LogRecord) -> bool:
+    """Whether the server's log should have it: a request that is broken off at the end is none."""
+    broken_off = record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError)
+    return not broken_off and "graceful shutdown exceeded" not in record.getMessage()
 
 
 def _run(host: str, port: int) -> None:

@@ -20,6 +20,7 @@ from jmorl.search.policy import Policy, values_of
 from jmorl.steering import RunState
 from jmorl.storage.manifest import read_manifest
 from jmorl.storage.stored_run import StoredRun, read_run
+from jmorl.units import measured_in
 
 PERSON = "terminal"  # the config's user whose questions are put on the page
 
@@ -74,7 +75,7 @@ class View:
 def stored_view(path: Path) -> View:
     """What a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
     manifest, config = read_manifest(path), resolve(file=path / "config.toml")
-    objectives = envs.make(config.env).objectives
+    objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
     nothing = View(path, manifest["run"], config, objectives, (), (), np.full(len(objectives), -np.inf), None, (), None)
     if not (path / "metrics.csv").exists():
         return nothing

@@ -14,7 +14,7 @@ from jmorl.studio.view import PERSON, View
 KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
-    ("1 2 …", "more of objective 1, 2, …; once more: all policies"),
+    ("1 2 …", "what is better in objective 1, 2, …; once more: all policies"),
     ("c", "choose the policy in focus"),
     ("k", "keep the last choice"),
     ("x", "put the policy in focus away"),
@@ -74,7 +74,7 @@ def heading(view: View, desk: Desk) -> str:
     question, more = view.question, wanted(view, desk)
     if more is not None and desk.more_of is not None and desk.than is not None:
         label = view.objectives[desk.more_of].label
-        return f"{plural(len(more), 'policy')} with more {label} than policy {desk.than}"
+        return f"{plural(len(more), 'policy')} better in {label} than policy {desk.than}"
     if question:
         policies = plural(len(question.front), "policy")
         if question.purpose == "final":
@@ -101,6 +101,14 @@ def scores(view: View, policy: Policy) -> str:
     return ", ".join(f"{objective.label} {score}" for objective, score in each)
 
 
+def raw_returns(view: View, policy: Policy) -> str:
+    """The mean undiscounted returns of a policy whose scores are in other units; empty where they are the scores."""
+    if policy.raw is None:
+        return ""
+    formats = [number_format(np.array([value])) for value in policy.raw]
+    return "raw returns: " + minus(values_in_words(policy.raw, view.objectives, formats))
+
+
 def formats_of(view: View) -> list[str]:
     """One for each objective, fit for the front; without one, of the policy that there is."""
     values = view.values if view.front else np.zeros((1, len(view.objectives)))
@@ -116,10 +124,12 @@ def score_of_each(view: View, policy: Policy) -> list[str]:
 def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
     """What choosing a policy would mean: what it rules out, and what the prediction model expects of what is left."""
     question = view.question
+    if question and not view.choosable(policy.id):
+        if policy.id in {each.id for each in view.front}:
+            return "Outside the bounds, so it cannot be the result"
+        return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
     if question is None or question.purpose != "steer":
         return f"born in generation {policy.generation}"
-    if not view.choosable(policy.id):
-        return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
     if prospect is None:
         return "Working out what choosing it would mean …"
     formats = formats_of(view)

@@ -61,6 +61,10 @@ class Tab:
         """The numbers of the policies in the table, from the top."""
         return self.page.locator(".policies-row > span:nth-child(2)").all_inner_texts()
 
+    def value(self, row):
+        """The first objective of a row."""
+        return float(self.rows().nth(row).locator("span").nth(2).inner_text().split()[0].replace("−", "-"))
+
     def look_at(self, row):
         """Click a row of the table; the number of its policy, when its card is there."""
         cell = self.rows().nth(row)

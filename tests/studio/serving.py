@@ -21,10 +21,10 @@ def free_port():
 class Served:
     """A studio that is being served; leaving the block ends it."""
 
-    def __init__(self, *arguments, port=None, host="127.0.0.1"):
+    def __init__(self, *arguments, port=None, host="127.0.0.1", command=("jmorl.cli", "studio")):
         self.port = port or free_port()
         self.log = []  # what it prints
-        command = [sys.executable, "-m", "jmorl.cli", "studio", *map(str, arguments)]
+        command = [sys.executable, "-m", *command, *map(str, arguments)]
         self.process = subprocess.Popen(
             [*command, "--port", str(self.port), "--host", host],
             stdout=subprocess.PIPE,

@@ -15,6 +15,7 @@ pytestmark = pytest.mark.studio
 # E-NAUTILUS shows its question with so many iterations left, or has ended.
 LEFT_OR_ENDED = """(left) => document.querySelector('[aria-label="iterations left"]')?.value === left
   || document.querySelector(".ending")"""
+CHART = """getElement(document.querySelector(".front .nicegui-echart").id.slice(1)).chart"""
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +178,36 @@ def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, small, tm
         tabs[1].page.get_by_text("was chosen, in another tab").wait_for()  # who has not clicked is told, too
         tabs[1].asked(3)
         assert not tabs[0].page.get_by_text("in another tab").count()
+
+
+def test_a_front_of_thousands_with_three_objectives_can_be_searched(browser):
+    with Served(command=("benchmarks.studio", "still")) as studio:
+        tab = Tab(browser, studio.address)
+        tab.asked(4)
+        first = tab.look_at(0)
+        best = tab.value(0)
+        tab.page.get_by_role("columnheader", name="objective 1").click()  # the other way round
+        tab.page.wait_for_function("(n) => !document.querySelector('.policies-row').textContent.includes(n)", arg=first)
+        assert tab.value(0) < tab.value(1) < best
+        tab.page.get_by_role("button", name="objective 3", exact=True).click()
+        tab.page.get_by_text(f"better in objective 3 than policy {first}").wait_for()
+        tab.page.get_by_role("button", name="objective 3", exact=True).click()
+        tab.page.get_by_text("which of these 2000 policies").wait_for()
+        tab.page.get_by_label("→").click()
+        tab.page.get_by_role("option", name="objective 3").click()
+        tab.page.wait_for_function(f"{CHART}.getOption().xAxis[0].name.startsWith('objective 3')")
+        # A click on a point lays out what is there, or what lies over it.
+        x, y = tab.page.evaluate(
+            f"""() => {{
+              const chart = {CHART}, place = chart.getDom().getBoundingClientRect();
+              const data = chart.getOption().series.find((each) => each.id === "within the bounds").data[7];
+              const [x, y] = chart.convertToPixel({{ xAxisIndex: 0, yAxisIndex: 0 }}, [data[3], data[2]]);
+              return [place.x + x, place.y + y];
+            }}"""
+        )
+        tab.page.mouse.click(x, y)
+        tab.page.locator(".place").nth(1).locator(".card-title").wait_for()
+        assert not tab.problems
 
 
 def test_the_keyboard_is_enough(browser, small, tmp_path):

@@ -51,13 +51,13 @@ def series(options):
 
 
 def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(view):
-    shown = series(front_options(view, (1, 0)))
+    shown = series(front_options(view, (1, 0), None))
     inside, outside = shown["within the bounds"], shown["outside the bounds"]
     assert {point[0] for point in inside["data"]} == {4, 9} and {point[0] for point in outside["data"]} == {2, 5}
     for point in (*inside["data"], *outside["data"]):
         assert tuple(point[1:3]) == VALUES[point[0]]
     assert inside["encode"] == {"x": 2, "y": 1}
-    options = front_options(view, (1, 0))
+    options = front_options(view, (1, 0), None)
     assert shown["bounds"]["markArea"]["data"] == [
         [{"coord": [-45.0, -82.0]}, {"coord": [options["xAxis"]["max"], options["yAxis"]["max"]]}]
     ]
@@ -65,16 +65,16 @@ def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(vie
 
 
 def test_axes_hold_the_front_the_bounds_and_the_choice(view):
-    options = front_options(replace(view, bounds=np.array([-200.0, -45.0])), (0, 1))
+    options = front_options(replace(view, bounds=np.array([-200.0, -45.0])), (0, 1), None)
     assert options["xAxis"]["min"] < -200 and options["xAxis"]["max"] > -60
     assert options["yAxis"]["min"] < -60 and options["yAxis"]["max"] > -10
     assert "time (-steps)" in options["xAxis"]["name"] and "better" in options["xAxis"]["name"]
 
 
 def test_what_is_too_far_out_to_be_shown_is_counted(view):
-    assert front_options(view, (0, 1))["title"]["text"] == ""
+    assert front_options(view, (0, 1), None)["title"]["text"] == ""
     with_stray = replace(view, front=(*view.front, policy(6, (-75.0, -30.0)), policy(7, (-900.0, -5.0))))
-    options = front_options(with_stray, (0, 1))
+    options = front_options(with_stray, (0, 1), None)
     assert options["title"]["text"] == "1 policy far out, in the table only" and options["xAxis"]["min"] > -200
 
 
@@ -83,7 +83,7 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
     empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
     for shown in (view, empty):
         for options in (
-            front_options(shown, (0, 1)),
+            front_options(shown, (0, 1), asked),
             front_marks(shown, Desk().with_policy(9), (0, 1), asked),
             parallel_options(shown),
             parallel_marks(shown, Desk().with_policy(9)),
@@ -95,7 +95,7 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
 
 
 def test_marks_lie_exactly_over_the_chart(view):
-    chart, marks = front_options(view, (1, 0)), front_marks(view, Desk().with_policy(9), (1, 0), None)
+    chart, marks = front_options(view, (1, 0), None), front_marks(view, Desk().with_policy(9), (1, 0), None)
     for axis in ("xAxis", "yAxis"):
         assert [chart[axis][end] for end in ("min", "max")] == [marks[axis][end] for end in ("min", "max")]
         assert chart[axis]["show"] and not marks[axis]["show"]
@@ -111,7 +111,7 @@ def test_charts_have_the_same_series_whatever_there_is_to_see(view):
     asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
     empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
     for much, little in (
-        (front_options(view, (0, 1)), front_options(empty, (0, 1))),
+        (front_options(view, (0, 1), asked), front_options(empty, (0, 1), None)),
         (front_marks(view, Desk().with_policy(9), (0, 1), asked), front_marks(empty, Desk(), (0, 1), None)),
         (parallel_options(view), parallel_options(empty)),
         (curve_options(view), curve_options(empty)),
@@ -119,9 +119,45 @@ def test_charts_have_the_same_series_whatever_there_is_to_see(view):
         assert [each["id"] for each in much["series"]] == [each["id"] for each in little["series"]]
 
 
-def test_what_has_left_the_front_says_that_it_cannot_be_chosen(view):
+def test_what_cannot_be_chosen_says_why(view):
     gone = policy(77, (-99.0, -99.0))
-    assert "cannot be chosen" in words.consequences(replace(view, previous=gone), None, gone)
+    final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
+    for each in (view, final):
+        assert "cannot be chosen" in words.consequences(replace(each, previous=gone), None, gone)
+    assert words.consequences(final, None, view.front[2]) == "Outside the bounds, so it cannot be the result"
+    assert words.consequences(final, None, view.front[0]) == "born in generation 1"
+
+
+def test_the_axes_hold_the_choices_and_what_enautilus_shows(view):
+    first = np.array([-130.0, -70.0])
+    options = front_options(replace(view, choices=((1, first), *view.choices)), (0, 1), None)
+    assert options["xAxis"]["min"] < -130 and options["yAxis"]["min"] < -70
+    asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
+    options = front_options(replace(view, bounds=np.full(2, -np.inf)), (0, 1), asked)
+    you = series(front_marks(view, Desk(), (0, 1), asked))["points of E-NAUTILUS"]["data"][0]["value"][1:3]
+    assert options["xAxis"]["min"] < you[0] and options["yAxis"]["min"] < you[1]
+
+
+def test_the_journey_ends_with_the_end(view):
+    choices = ((2, view.front[0].values), (3, view.front[1].values))
+    ended = replace(view, choices=choices, result=view.front[1], question=None)
+    generations = (*view.generations, replace(view.generations[-1], number=2))
+    labels = [
+        each["label"]["formatter"]
+        for each in series(front_options(replace(ended, generations=generations), (0, 1), None))["choices"]["data"]
+    ]
+    assert labels == ["2", "end"]
+
+
+def test_scores_in_other_units_have_the_raw_returns_beside_them(view):
+    assert words.raw_returns(view, view.front[0]) == ""
+    scored = replace(view.front[0], raw=np.array([-812.0, -20.5]))
+    assert words.raw_returns(view, scored) == "raw returns: time −812, <b>fuel</b> −20.5"
+
+
+def test_lines_say_which_policy_they_are(view):
+    formatter = series(parallel_options(view))["within the bounds"]["tooltip"][":formatter"]
+    assert '["time (-steps)", "<b>fuel</b> (-J)"]' in formatter and "p.data[names.length]" in formatter
 
 
 def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
@@ -132,6 +168,8 @@ def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
     assert shown["bounds that would follow"]["markArea"]["data"][0][0] == {"coord": [-75.0, -42.0]}
     assert [point[1:3] for point in shown["expected by the model"]["data"]] == expected.tolist()
     assert [point["label"]["formatter"] for point in shown["laid out"]["data"]] == ["A", "B"]
+    answered = series(front_marks(replace(view, question=None), desk, (0, 1), None))
+    assert not answered["expected by the model"]["data"]
     unfocused = series(front_marks(view, replace(desk, focus=4), (0, 1), None))
     assert (
         not unfocused["bounds that would follow"]["markArea"]["data"] and not unfocused["expected by the model"]["data"]
@@ -153,7 +191,8 @@ def test_lines_across_the_axes_have_the_values_of_the_policies(view):
 def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
     final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
     borders = [
-        series(front_options(each, (0, 1)))["outside the bounds"]["itemStyle"]["borderColor"] for each in (view, final)
+        series(front_options(each, (0, 1), None))["outside the bounds"]["itemStyle"]["borderColor"]
+        for each in (view, final)
     ]
     assert borders == ["#0072B2", "#b8b8b8"]
     assert final.choosable(4) and not final.choosable(2) and view.choosable(2)
@@ -174,7 +213,7 @@ def test_with_nothing_wanted_there_is_no_ring(view):
 
 def test_the_heading_says_what_is_asked(view):
     assert words.heading(view, Desk()) == "Generation 2: which of these 4 policies do you prefer?"
-    assert words.heading(view, Desk(more_of=0, than=4)) == "2 policies with more time than policy 4"
+    assert words.heading(view, Desk(more_of=0, than=4)) == "2 policies better in time than policy 4"
     final = replace(view, question=replace(view.question, purpose="final"))
     assert words.heading(final, Desk()) == "The run is over. Which of these 4 policies is its result?"
     ended = replace(view, question=None, result=view.front[2], timeline=None)

@@ -1,7 +1,9 @@
 """The server as a whole, without a browser: who is let in at every door, and what can be read through them."""
 
+import asyncio
 import io
 import json
+import logging
 import shutil
 
 import httpx
@@ -12,6 +14,7 @@ from websockets.sync.client import connect
 
 from jmorl.cli import main
 from jmorl.storage.manifest import read_manifest
+from jmorl.studio.server import is_trouble
 from tests.registered import ThreeWays
 from tests.resuming import train
 from tests.studio.serving import Served
@@ -146,3 +149,17 @@ def test_a_port_that_is_taken_is_said_before_anything_is_made(studio, tmp_path, 
     assert main(arguments) == 1
     assert f"cannot listen on 127.0.0.1, port {studio.port}" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("message", "error", "shown"),
+    [
+        ("Exception in ASGI application", ValueError("broken"), True),
+        ("Exception in ASGI application", asyncio.CancelledError("Task cancelled"), False),
+        ("Cancel 1 running task(s), timeout graceful shutdown exceeded", None, False),
+        ("Invalid HTTP request received.", None, True),
+    ],
+)
+def test_what_the_end_of_the_server_breaks_off_is_no_trouble(message, error, shown):
+    info = (type(error), error, None) if error else None
+    assert is_trouble(logging.LogRecord("uvicorn.error", logging.ERROR, "", 0, message, (), info)) == shown
