@@ -6,8 +6,8 @@ DEMO_OUT ?= runs/demo
 INSTALLED := $(VENV)/.installed
 BROWSER := $(VENV)/.browser
 
-.PHONY: demo studio test test-slow test-studio screenshots check format bench bench-physics bench-checkpoints bench-studio \
-	quality paper clean
+.PHONY: demo studio test test-slow test-studio screenshots check format bench bench-demo bench-physics bench-checkpoints \
+	bench-studio quality paper clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
@@ -40,6 +40,9 @@ format: $(INSTALLED)
 
 bench: $(INSTALLED)  ## speed and memory, beside morl-baselines; the first time it installs that (gigabytes) in .venv-peer
 	$(BIN)/python -m benchmarks.speed
+
+bench-demo: $(INSTALLED)  ## what a new user of the demo waits for, with nothing compiled and the second time (2 minutes)
+	$(BIN)/python -m benchmarks.demo
 
 bench-checkpoints: $(INSTALLED)  ## what checkpoints cost, as a share of a generation
 	$(BIN)/python -m benchmarks.checkpoints

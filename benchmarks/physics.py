@@ -7,7 +7,6 @@ steps of five time steps; repetitions of all three take turns, and the best of e
 """
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,7 +29,7 @@ from envs.mujoco_model import load_model
 from envs.physics import BodyState
 from envs.planar import PlanarPhysics, solver
 from envs.planar.step import forward
-from jmorl.learning.devices import use_all_cpu_cores
+from jmorl.learning.devices import usable_cores, use_all_cpu_cores
 
 RESULT = Path(__file__).parent / "physics.json"
 STATES = 20_000  # of each kind
@@ -184,7 +183,7 @@ def _jax_player(
 def _mujoco_player(start: tuple[np.ndarray, np.ndarray], controls: Control) -> Callable[[], None]:
     """MuJoCo's own rollouts on all threads, an environment step at a time, as a policy needs it."""
     model = load_model("half_cheetah")
-    threads = len(os.sched_getaffinity(0))
+    threads = usable_cores()
     pool, workers = rollout.Rollout(nthread=threads), [mujoco.MjData(model) for _ in range(threads)]
     times = np.zeros((len(start[0]), 1))
     held = np.repeat(controls[:, :, None], FRAME_SKIP, axis=2).astype(np.float64)  # [steps, N, substeps, U]

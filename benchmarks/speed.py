@@ -28,7 +28,7 @@ from rich.table import Table
 
 import envs
 from jmorl.config import resolve
-from jmorl.learning.devices import use_all_cpu_cores
+from jmorl.learning.devices import usable_cores, use_all_cpu_cores
 from jmorl.learning.population import Population
 from jmorl.run import Compiled, GenerationFinished, evaluation_keys, run
 from jmorl.search.prediction import Records, predict
@@ -37,7 +37,8 @@ from jmorl.search.weights import simplex_grid, spread_weights
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-PEER_PYTHON = ROOT / ".venv-peer" / "bin" / "python"
+PEER = ROOT / ".venv-peer"
+PEER_PYTHON = PEER / "bin" / "python"
 REPEATS = 3
 SCALED_ITERATIONS = 2  # in a timed call, where sizes are compared
 
@@ -72,7 +73,7 @@ def machine() -> dict[str, Any]:
     device = jax.devices()[0]
     return {
         "cpu": _cpu_name(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": usable_cores(),
         "device": f"{jax.device_count()} x {device.device_kind}",
         "jax": jax.__version__,
         "load_before": round(os.getloadavg()[0], 2),
@@ -195,12 +196,19 @@ def _seconds(call: Callable[[], Any]) -> float:
     return time.perf_counter() - started
 
 
+def install_peer() -> None:
+    """Make the peer's environment, unless it is whole and newer than its requirements."""
+    requirements, installed = HERE / "peer" / "requirements.txt", PEER / ".installed"
+    if installed.exists() and installed.stat().st_mtime >= requirements.stat().st_mtime:
+        return
+    subprocess.run([sys.executable, "-m", "venv", PEER], check=True)
+    subprocess.run([PEER_PYTHON, "-m", "pip", "install", "--quiet", "-r", requirements], check=True)
+    installed.touch()
+
+
 def peer(env: str) -> dict[str, Any]:
     """morl-baselines' PGMORL at the paper preset's sizes, now: a short warm-up and one generation."""
-    if not PEER_PYTHON.exists():
-        subprocess.run([sys.executable, "-m", "venv", PEER_PYTHON.parents[1]], check=True)
-        install = [PEER_PYTHON, "-m", "pip", "install", "--quiet", "-r", HERE / "peer" / "requirements.txt"]
-        subprocess.run(install, check=True)
+    install_peer()
     config = resolve("paper", None, {"env": env})
     sizes = {
         "--env": env,
@@ -249,6 +257,7 @@ def _run_rows(whole: dict[str, Any]) -> list[tuple[str, str, str]]:
         ("whole generation", f"{whole['steps_per_second']:,} steps/s", f"{whole['total_seconds']:.2f} s"),
         ("- training", f"{whole['train_share']:.1%}", f"{whole['train_seconds']:.2f} s"),
         ("- evaluation", f"{whole['evaluate_share']:.1%}", f"{whole['evaluate_seconds']:.3f} s"),
+        ("  evaluation alone", f"{whole['evaluation_steps_per_second']:,} steps/s", ""),
         ("- selection", f"{whole['select_share']:.1%}", f"{whole['select_seconds']:.3f} s"),
         ("compilation, once a run", "", f"{whole['compile_seconds']:.1f} s"),
         ("peak memory so far", f"{whole['peak_memory_mib']:,} MiB", ""),

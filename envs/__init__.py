@@ -10,10 +10,24 @@ from collections.abc import Callable
 from typing import Any
 
 from envs.core import Environment, EpisodeState, Objective, Step, Transition
+from envs.declared import NotAsDeclared, check_declaration, check_environment
+from envs.failures import failure
 from envs.half_cheetah import HalfCheetah
 from envs.mountain_car import MountainCar
 
-__all__ = ["Environment", "EpisodeState", "Objective", "Step", "Transition", "ids", "make", "plain_id", "register"]
+__all__ = [
+    "Environment",
+    "EpisodeState",
+    "NotAsDeclared",
+    "Objective",
+    "Step",
+    "Transition",
+    "check_environment",
+    "ids",
+    "make",
+    "plain_id",
+    "register",
+]
 
 _registry: dict[str, Callable[..., Environment[Any]]] = {}
 
@@ -31,22 +45,24 @@ def make(id: str, **options: Any) -> Environment[Any]:
     """The environment called `id`; `module:id` imports `module`, which registers it, first.
 
     `id,option=value` is another way to give options, as texts. Raises ValueError, naming what is known, for a module,
-    an id or an option that there is none of, and for a value that the environment refuses.
+    an id or an option that there is none of, for a value that the environment refuses, for a module or an environment
+    that breaks down, and NotAsDeclared for one that declares what cannot be.
     """
     module, name, written = _parts(id)
     if module:
-        try:
-            importlib.import_module(module)
-        except ImportError as error:
-            raise ValueError(f"environment {id!r}: cannot import {module!r}: {error}") from error
+        _import(id, module)
     if name not in _registry:
         raise ValueError(f"unknown environment {name!r}; known: {', '.join(ids())}")
     factory, options = _registry[name], written | options
-    known = list(inspect.signature(factory).parameters)
-    for option in options:
-        if option not in known:
-            raise ValueError(f"environment {name!r} has no option {option!r}; known: {', '.join(known) or 'none'}")
-    return factory(**options)
+    _check_options(name, factory, options)
+    try:
+        environment = factory(**options)
+    except ValueError:
+        raise
+    except Exception as error:
+        raise ValueError(f"environment {name!r} cannot be made: {failure(error)}") from error
+    check_declaration(environment)
+    return environment
 
 
 def ids() -> list[str]:
@@ -57,6 +73,29 @@ def ids() -> list[str]:
 def plain_id(id: str) -> str:
     """The id without module and options: what MO-Gymnasium calls the environment."""
     return id.partition(",")[0].rpartition(":")[2]
+
+
+def _import(id: str, module: str) -> None:
+    try:
+        importlib.import_module(module)
+    except Exception as error:
+        said = str(error) if isinstance(error, ImportError) else failure(error)
+        raise ValueError(f"environment {id!r}: cannot import {module!r}: {said}") from error
+
+
+def _check_options(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> None:
+    """Raise ValueError for an option that there is none of, and for those that are missing."""
+    parameters = inspect.signature(factory).parameters
+    for option in options:
+        if option not in parameters:
+            known = ", ".join(parameters) or "none"
+            raise ValueError(f"environment {name!r} has no option {option!r}; known: {known}")
+    variadic = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    needed = [each.name for each in parameters.values() if each.default is each.empty and each.kind not in variadic]
+    missing = [option for option in needed if option not in options]
+    if missing:
+        written = ",".join([name, *(f"{option}=VALUE" for option in missing)])
+        raise ValueError(f"environment {name!r} needs {', '.join(missing)}: write {written}")
 
 
 def _parts(id: str) -> tuple[str, str, dict[str, str]]:

@@ -4,6 +4,7 @@ The names here are all that a program needs; see the README. Settings are in `jm
 """
 
 from jmorl.config import Config, ConfigError, resolve
+from jmorl.decision.navigation import navigate
 from jmorl.decision.protocol import Answer, DecisionMaker, Question
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.population import TrainingFault
@@ -23,6 +24,7 @@ __all__ = [
     "TrainingFault",
     "branch",
     "load_policy",
+    "navigate",
     "read_run",
     "resolve",
     "resume",

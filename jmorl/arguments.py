@@ -1,13 +1,29 @@
 """What the command line takes: commands, their arguments, and a flag for every setting."""
 
 import argparse
+import re
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from jmorl.config import PRESETS, Config, Section
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
+FLAG, NEGATIVE_VALUE = re.compile(r"--[^=]+"), re.compile(r"-\.?\d.*")
+OF_SETTINGS = """\
+In parentheses is a setting's value; below it are values for environments in which the default preset, or another one
+that is named, has something else."""
 PAPER_ITEMS = ("table1", "fig5", "fig6", "fig9", "fig10", "table2", "fig7", "fig8", "fig11", "targets")
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """The options that are given. A flag may be followed by `-999,-999`, which argparse alone takes for a flag."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and FLAG.fullmatch(joined[-1]) and NEGATIVE_VALUE.fullmatch(argument):
+            argument = f"{joined.pop()}={argument}"
+        joined.append(argument)
+    return parser().parse_args(joined)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -36,13 +52,13 @@ def parser() -> argparse.ArgumentParser:
     _add_policy(evaluate)
     evaluate.add_argument("--in", dest="where", choices=["gymnasium"], help="also in MO-Gymnasium, side by side")
     evaluate.add_argument("--episodes", type=_count, default=100, help="default: 100")
-    evaluate.add_argument("--seed", type=int, default=0, help="of the start states (default: 0)")
+    evaluate.add_argument("--seed", type=_seed, default=0, help="of the start states (default: 0)")
     evaluate.add_argument("--json", action="store_true", help="print every episode's returns as JSON")
 
     play = commands.add_parser("play", help="draw an episode of a saved policy: animation, film, or strip of poses")
     _add_policy(play)
     play.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .png (a strip)")
-    play.add_argument("--seed", type=int, default=0, help="of the start state, as in evaluate (default: 0)")
+    play.add_argument("--seed", type=_seed, default=0, help="of the start state, as in evaluate (default: 0)")
     play.add_argument("--steps", type=_count, help="at most so many (default: the whole episode)")
     play.add_argument("--size", type=_size, metavar="PIXELS", help="width (default: 640, for a strip 1280)")
     play.add_argument("--force", action="store_true", help="overwrite the file")
@@ -60,7 +76,7 @@ def _add_train(commands: Any) -> None:
     train = commands.add_parser(
         "train",
         help="train a population, with a decision maker in the loop",
-        description="Preset, then config file, then flags: each overrides the one before.",
+        description=f"Preset, then config file, then flags: each overrides the one before.\n{OF_SETTINGS}",
         formatter_class=argparse.RawTextHelpFormatter,
     )
     _add_new_run(train)
@@ -88,7 +104,8 @@ def _add_studio(commands: Any) -> None:
     studio = commands.add_parser(
         "studio",
         help="steer a run on a web page: a new one, or one that was interrupted or has ended",
-        description="Without RUN a new one is made, as by train; you are its user unless --user names another.",
+        description="Without RUN a new one is made, as by train; you are its user unless --user names another.\n"
+        f"{OF_SETTINGS}",
         formatter_class=argparse.RawTextHelpFormatter,
     )
     studio.add_argument("run", type=Path, nargs="?", metavar="RUN", help="run folder, to go on with or to look at")
@@ -118,7 +135,7 @@ def _add_continuing(commands: Any) -> None:
     branch = commands.add_parser("branch", help="begin a new run where a run was after one of its generations")
     branch.add_argument("run", type=Path, metavar="RUN", help="run folder, which stays as it is")
     branch.add_argument(
-        "--generation", type=int, required=True, metavar="K", help="the last one taken over; 0: warm-up"
+        "--generation", type=_id, required=True, metavar="K", help="the last one taken over; 0: warm-up"
     )
     branch.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder of the new run")
     branch.add_argument("--user", help="who decides from then on, as in train (default: the run's own user)")
@@ -127,7 +144,7 @@ def _add_continuing(commands: Any) -> None:
 
     export = commands.add_parser("export", help="copy a policy of a run to a file of its own")
     export.add_argument("run", type=Path, metavar="RUN", help="run folder")
-    export.add_argument("--policy", type=int, metavar="ID", help="default: the run's choice")
+    export.add_argument("--policy", type=_id, metavar="ID", help="default: the run's choice")
     export.add_argument("--to", type=Path, required=True, metavar="FILE", help="a NumPy archive, .npz")
     export.add_argument("--force", action="store_true", help="overwrite the file")
 
@@ -139,7 +156,7 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
 
 def _add_policy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("policy", type=Path, metavar="RUN_OR_POLICY", help="run folder, or policy file")
-    parser.add_argument("--policy", dest="id", type=int, metavar="ID", help="of a run folder (default: its choice)")
+    parser.add_argument("--policy", dest="id", type=_id, metavar="ID", help="of a run folder (default: its choice)")
 
 
 def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Section], prefix: str) -> None:
@@ -150,21 +167,59 @@ def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Sec
             title = f"{name}: {(kind.__doc__ or '').splitlines()[0]}"
             _add_settings(parser, parser.add_argument_group(title), kind, f"{prefix}{name}.")
         else:
-            default = field.default if not isinstance(field.default, tuple) else ",".join(map(str, field.default))
-            shown = "" if default is None else f" ({default})"
+            default = _written(field.default)
+            texts = [f"{field.description} ({default})" if default else f"{field.description}"]
+            texts += _in_presets([*prefix.split(".")[:-1], name], default)
             group.add_argument(
                 f"--{prefix}{name}".replace("_", "-"),
                 dest=f"{SETTING}{prefix}{name}",
                 metavar=name.rpartition("_")[2].upper(),
-                help=f"{field.description}{shown}".replace("%", "%%"),
+                help="\n".join(texts).replace("%", "%%"),
             )
 
 
-def _count(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, not {number}")
+def _in_presets(path: Sequence[str], default: str) -> Iterator[str]:
+    """`ENV: value`, and what other presets say, for each environment in which a preset changes a setting."""
+    for env in PRESETS["default"]:
+        values = {
+            preset: _preset_value(environments.get(env, {}), path, default) for preset, environments in PRESETS.items()
+        }
+        usual = values.pop("default")
+        others = [f"in preset {preset} {value}" for preset, value in values.items() if value != usual]
+        if others or usual != default:
+            yield f"{env}: {', '.join([usual, *others])}"
+
+
+def _preset_value(settings: Any, path: Sequence[str], default: str) -> str:
+    for name in path:
+        if name not in settings:
+            return default
+        settings = settings[name]
+    return _written(settings)
+
+
+def _written(value: Any) -> str:
+    """A value as on the command line."""
+    return ",".join(f"{each:g}" for each in value) if isinstance(value, tuple) else str(value)
+
+
+def _whole(least: int, most: int | None = None) -> Callable[[str], int]:
+    """Takes a whole number within bounds."""
+
+    def number(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"must be a whole number, not {text!r}") from None
+        if value < least or (most is not None and value > most):
+            limits = f"at least {least}" if most is None else f"from {least} to {most}"
+            raise argparse.ArgumentTypeError(f"must be {limits}, not {value}")
+        return value
+
     return number
+
+
+_count, _id, _seed, _port, _size = _whole(1), _whole(0), _whole(0, 2**32 - 1), _whole(1, 65535), _whole(160, 4096)
 
 
 def _items(text: str) -> list[str]:
@@ -176,18 +231,4 @@ def _items(text: str) -> list[str]:
 
 
 def _seeds(text: str) -> tuple[int, ...]:
-    return tuple(int(word) for word in text.split(","))
-
-
-def _port(text: str) -> int:
-    number = int(text)
-    if not 1 <= number <= 65535:
-        raise argparse.ArgumentTypeError(f"must be from 1 to 65535, not {number}")
-    return number
-
-
-def _size(text: str) -> int:
-    number = int(text)
-    if not 160 <= number <= 4096:
-        raise argparse.ArgumentTypeError(f"must be from 160 to 4096, not {number}")
-    return number
+    return tuple(_seed(word) for word in text.split(","))

@@ -10,12 +10,13 @@ import os
 import secrets
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.core import Objective
-from jmorl.arguments import SETTING, parser
+from jmorl.arguments import SETTING, parse
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.signals import Interrupted, StopSignals
@@ -29,15 +30,16 @@ EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command. Returns the exit code; argparse itself exits with 2 for unknown flags."""
-    options = parser().parse_args(arguments)
+    options = parse(sys.argv[1:] if arguments is None else arguments)
     sys.path.insert(0, os.getcwd())  # for an environment of one's own, as `--env my_module:my-env-v0`
+    from envs.declared import NotAsDeclared
     from envs.drawing import NoDrawing
     from jmorl.decision.records import ScriptError
+    from jmorl.evaluation import NotInGymnasium
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
     from jmorl.paper.record import RecordError
     from jmorl.playback import PlaybackError
-    from jmorl.scoring import NotInGymnasium
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.continuing import CannotContinue
     from jmorl.storage.lock import FolderInUse
@@ -51,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         COMMANDS[options.command](options)
     except ConfigError as error:
         return _failed(error.problems, EXIT_BAD_INPUT)
-    except (*wrong_place, NoDrawing, NotInGymnasium, PlaybackError) as error:
+    except (*wrong_place, NoDrawing, NotAsDeclared, NotInGymnasium, PlaybackError) as error:
         return _failed([str(error)], EXIT_BAD_INPUT)
     except (TrainingFault, ScriptError, EOFError, OSError, CheckpointError) as error:
         return _failed([f"stopped: {error}", *_notes(error)], EXIT_FAILED)
@@ -73,14 +75,7 @@ def _notes(error: BaseException) -> list[str]:
 
 
 def _train(options: argparse.Namespace) -> None:
-    import envs
-    from jmorl.storage.continuing import Continued
-    from jmorl.storage.run_folder import RunFolder
-
-    config = _checked_config(options)
-    environment = envs.make(config.env)
-    user = _decision_maker(config.user, environment.objectives)
-    _follow(Continued(RunFolder.create(options.out, config, environment, options.force), None), user, options)
+    _follow(_begun(options), options)
 
 
 def _resume(options: argparse.Namespace) -> None:
@@ -88,25 +83,41 @@ def _resume(options: argparse.Namespace) -> None:
     from jmorl.storage.continuing import AlreadyFinished, resume
     from jmorl.storage.stored_run import read_run
 
+    if not (options.run / "result.json").exists():
+        _check_json(options, _stored_user(options.run))
     try:
         continued = resume(options.run)
     except AlreadyFinished as finished:
-        print(finished)
+        if not options.quiet:
+            print(f"jmorl: {finished}", file=sys.stderr)
         draw_run(read_run(options.run), options.run / "plots")  # it may have been killed in doing so
         return
-    _follow(continued, None, options)
+    _follow(continued, options)
 
 
 def _branch(options: argparse.Namespace) -> None:
     from jmorl.storage.continuing import branch
 
-    _follow(branch(options.run, options.generation, options.out, options.user, options.force), None, options)
+    _check_json(options, options.user or _stored_user(options.run))
+    _follow(branch(options.run, options.generation, options.out, options.user, options.force), options)
 
 
-def _follow(continued: "Continued", user: DecisionMaker | None, options: argparse.Namespace) -> None:
+def _begun(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> "Continued":
+    """A new run, over defaults of a command's own. Bad input makes nothing."""
+    import envs
+    from jmorl.storage.continuing import Continued
+    from jmorl.storage.run_folder import RunFolder
+
+    config = _checked_config(options, defaults)
+    environment = envs.make(config.env)
+    user = _decision_maker(config.user, environment.objectives)
+    return Continued(RunFolder.create(options.out, config, environment, options.force), None, user=user)
+
+
+def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     """Run to the end, or until a signal; show it, and draw it.
 
-    `user` defaults to that of the config. What breaks the run off, but not for good, says how to go on.
+    What breaks the run off, but not for good, says how to go on.
     """
     from rich.console import Console
 
@@ -130,7 +141,13 @@ def _follow(continued: "Continued", user: DecisionMaker | None, options: argpars
             watcher(kind, config, objectives, console) as watching,
             StopSignals() as stop,
         ):
-            for event in continued.events(user, stop.asking):
+
+            @contextmanager
+            def asking() -> Iterator[None]:
+                with watching.asking(), stop.asking():
+                    yield
+
+            for event in continued.events(asking=asking):
                 watching.show(event)
                 if not isinstance(event, RunFinished):
                     stop.check()
@@ -172,16 +189,12 @@ def _studio(options: argparse.Namespace) -> None:
 
 def _open(session: "Session", options: argparse.Namespace) -> None:
     """Go on with the run that is named, or begin a new one."""
-    import envs
-    from jmorl.storage.continuing import Continued
-    from jmorl.storage.run_folder import RunFolder
     from jmorl.studio.view import PERSON
 
     if options.run:
         session.open(options.run)
     else:
-        config = _checked_config(options, {"user": PERSON})
-        session.drive(Continued(RunFolder.create(options.out, config, envs.make(config.env), options.force), None))
+        session.drive(_begun(options, {"user": PERSON}))
 
 
 def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> Config:
@@ -201,11 +214,26 @@ def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | N
         problems.append(f"out: {error}")
     try:
         config = resolve(options.preset, options.config, {**(defaults or {}), **_overrides(options)})
+        _check_json(options, config.user)
     except ConfigError as error:
         raise ConfigError(error.problems + problems) from None
     if problems:
         raise ConfigError(problems)
     return config
+
+
+def _check_json(options: argparse.Namespace, user: str) -> None:
+    """Raise ConfigError if a person at this terminal would be asked among lines of JSON."""
+    if getattr(options, "json", False) and user.strip() == "terminal":
+        raise ConfigError(["json: questions at this terminal would stand between its lines; take another --user"])
+
+
+def _stored_user(run: Path) -> str:
+    """Whom the run in a folder asks. What is wrong with the folder is said by those who read it."""
+    try:
+        return resolve(file=run / "config.toml").user
+    except ConfigError:
+        return ""
 
 
 def _decision_maker(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
@@ -235,8 +263,8 @@ def _evaluate(options: argparse.Namespace) -> None:
     import numpy as np
     from rich.console import Console
 
+    from jmorl.evaluation import difference_in_errors, evaluate_in_gymnasium, evaluate_stored
     from jmorl.report.tables import comparison_table, evaluation_table
-    from jmorl.scoring import difference_in_errors, evaluate_in_gymnasium, evaluate_stored
     from jmorl.storage.policy_file import load_policy, policy_path
 
     path = policy_path(options.policy, options.id)
@@ -286,6 +314,7 @@ def _enautilus(options: argparse.Namespace) -> None:
     from jmorl.storage.stored_run import read_run
 
     stored = read_run(options.run)
+    _check_json(options, options.user or stored.config.user)
     user = _decision_maker(options.user or stored.config.user, stored.objectives)
     chosen = choose_afterwards(stored, user, options.iterations, options.points)
     if options.json:

@@ -9,10 +9,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-import envs
 from envs.core import Environment
 from envs.drawing import Scene
-from jmorl.storage.policy_file import StoredPolicy
+from jmorl.storage.policy_file import StoredPolicy, policy_environment
 
 
 class PlaybackError(ValueError):
@@ -42,8 +41,8 @@ class Recording:
 def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) -> Recording:
     """A deterministic episode from `key`'s start, to its end or for `most_steps`.
 
-    With the same key it is the episode that `jmorl.scoring.evaluate_stored` scores. Policies of one environment share
-    a compiled program.
+    With the same key it is the episode that `jmorl.evaluation.evaluate_stored` scores. Policies of one environment
+    share a compiled program. Raises PolicyFileError if that environment cannot be made here.
     """
     environment, episode = _program(policy.header["environment"], most_steps)
     first, (states, rewards, endings) = jax.device_get(episode(_arrays(policy), key))
@@ -56,7 +55,7 @@ def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) 
 @lru_cache(maxsize=4)
 def _program(environment_id: str, most_steps: int | None) -> tuple[Environment[Any], Callable[..., Any]]:
     """An environment, and the episode in it of a policy given by its arrays, from the start of a key."""
-    environment = envs.make(environment_id)
+    environment = policy_environment(environment_id)
     length = min(most_steps or environment.time_limit, environment.time_limit)
 
     @jax.jit

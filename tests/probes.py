@@ -62,6 +62,13 @@ class Endless(Probe):
         return jnp.array(False)
 
 
+class Onwards(Probe):
+    """The number of steps as observation, until the time limit: what follows the last step is not where one begins."""
+
+    def ends(self, state):
+        return jnp.array(False)
+
+
 class Compromise(Probe):
     """Objectives that want the action at -0.8 and at 0.8: do the weights decide what is learned?"""
 
@@ -126,3 +133,20 @@ class Faulty(ThreeWays):
         broken = (steps >= self.breaks_at) & (self.where == "reward")
         reward = jnp.where(broken, self.value, result.reward)
         return Transition(jnp.concatenate([result.state, steps[None]]), reward, result.terminated)
+
+
+class FaultyLater(Compromise):
+    """Breaks in the seventh step of an episode. An action that is repeated ends one: no evaluation goes so far."""
+
+    id = "probe-faulty-later"
+
+    def initial_state(self, key):
+        return jnp.array([0.0, jnp.inf])  # steps, and the last action
+
+    def observe(self, state):
+        return jnp.zeros(1)
+
+    def transition(self, state, action):
+        steps = state[0] + 1
+        reward = jnp.where(steps >= 7, jnp.nan, self.reward(state, action))
+        return Transition(jnp.stack([steps, action[0]]), reward, action[0] == state[1])

@@ -4,10 +4,14 @@ import json
 import shutil
 from dataclasses import replace
 
+import jax.numpy as jnp
 import pytest
 
+import envs
+from jmorl.config import ConfigError
 from jmorl.storage.continuing import CannotContinue, branch, resume
 from jmorl.storage.lock import FolderInUse
+from tests.probes import ThreeWays
 from tests.resuming import Counting, follow, go_on, outcome, train
 
 
@@ -60,6 +64,37 @@ def test_a_branch_that_cannot_be_made_says_why_and_makes_nothing(whole, tmp_path
     with pytest.raises(error, match=message):
         branch(whole, how.get("generation", 1), tmp_path / how.get("out", "new"))
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_branch_whose_script_cannot_be_read_is_not_made(whole, tmp_path):
+    (tmp_path / "broken.jsonl").write_text("{")
+    for script, message in (("broken.jsonl", "line 1 is not valid JSON"), ("gone.jsonl", "there is no decision log")):
+        with pytest.raises(ConfigError, match=f"^user: .*{message}"):
+            branch(whole, 1, tmp_path / "new", f"script={tmp_path / script}")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_checkpoint_of_another_run_is_not_branched_off(whole, small_config, tmp_path):
+    other = train(tmp_path / "other", small_config.replace(seed=2), events=2)
+    copy = shutil.copytree(whole, tmp_path / "copy")
+    shutil.rmtree(copy / "checkpoints")
+    shutil.copytree(other / "checkpoints", copy / "checkpoints")
+    with pytest.raises(CannotContinue, match="00000 belongs to another run; branch off another generation"):
+        branch(copy, 0, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_checkpoint_that_does_not_fit_its_environment_is_not_branched_off(whole, tmp_path, monkeypatch):
+    class Wider(ThreeWays):
+        observation_size = 3
+
+        def observe(self, state):
+            return jnp.append(state, 0.0)
+
+    monkeypatch.setattr(envs, "_registry", {ThreeWays.id: Wider})
+    with pytest.raises(CannotContinue, match="00001 does not fit this jmorl: it has learners of another shape"):
+        branch(whole, 1, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_branch_never_overwrites_its_parent(whole):

@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ import pytest
 import envs
 from jmorl import load_policy, read_run
 from jmorl.cli import main
+from jmorl.evaluation import evaluate_stored
 from jmorl.run import evaluation_keys
-from jmorl.scoring import evaluate_stored
+from tests.studio.serving import free_port
 
 TRAIN = [
     *("train", "--env", "probe-three-ways", "--user", "weights=0.5,0.3,0.2", "--steps", "2112", "--quiet"),
@@ -124,6 +126,20 @@ def test_show_prints_the_front_and_draws(folder, capsys):
     assert (folder / "plots" / "front.png").exists()
 
 
+@pytest.mark.parametrize("name", ["metrics.csv", "policies.csv", "front.csv"])
+def test_a_table_with_half_a_row_is_named(folder, capsys, name):
+    lines = (folder / name).read_text().splitlines(keepends=True)
+    (folder / name).write_text("".join(lines[:-1]) + lines[-1][:1])
+    assert main(["show", str(folder)]) == 2
+    assert capsys.readouterr().err.endswith(f"{name}, line {len(lines)} ends too early\n")
+
+
+def test_a_manifest_with_other_things_in_it_is_no_traceback(folder, capsys):
+    (folder / "manifest.json").write_text('{"format": "one"}')
+    assert main(["show", str(folder)]) == 2
+    assert "cannot be read as a run" in capsys.readouterr().err
+
+
 def test_envs_lists_every_environment(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "140")
     assert main(["envs"]) == 0
@@ -184,6 +200,78 @@ def test_bad_input_is_one_clear_message(arguments, message, tmp_path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
+BAD = """
+import envs
+import jax.numpy as jnp
+from tests.probes import ThreeWays
+
+
+class Short(ThreeWays):
+    def observe(self, state):
+        return state[:1]
+
+    def transition(self, state, action):
+        result = super().transition(state, action)
+        return result._replace(reward=result.reward[:2], terminated=jnp.zeros(1, bool))
+
+
+class Single(ThreeWays):
+    objectives = ThreeWays.objectives[:1]
+
+
+envs.register("short-v0", Short)
+envs.register("single-v0", Single)
+"""
+
+
+@pytest.fixture
+def bad_environments(tmp_path, monkeypatch):
+    """Those of a module `my_bad` in the working directory."""
+    monkeypatch.setattr(envs, "_registry", dict(envs._registry))
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "my_bad", raising=False)
+    (tmp_path / "my_bad.py").write_text(BAD)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("bad_environments")
+@pytest.mark.parametrize("command", ["train", "studio"])
+@pytest.mark.parametrize(
+    ("env", "messages"),
+    [
+        (
+            "my_bad:short-v0",
+            ("observation has shape (1,), not (2,)", "reward has shape (2,), not (3,)", "terminated has shape (1,)"),
+        ),
+        ("my_bad:single-v0", ("jmorl: env: ", "there must be 2 objectives or more, not 1")),
+    ],
+)
+def test_an_environment_that_is_not_as_it_declares_makes_nothing_and_empties_nothing(
+    folder, capsys, command, env, messages
+):
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    arguments = [command, *TRAIN[1:], *(["--port", str(free_port())] if command == "studio" else [])]
+    arguments[arguments.index("--env") + 1] = env
+    arguments = [argument for argument in arguments if argument != "--quiet"]
+    assert main([*arguments, "--out", str(folder), "--force"]) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert all(message in error for message in messages), error
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    assert main([*arguments, "--out", str(folder.with_name("new"))]) == 2
+    assert not folder.with_name("new").exists()
+
+
+@pytest.mark.parametrize("command", ["train", "studio", "branch"])
+def test_a_script_that_cannot_be_read_makes_nothing(trained, tmp_path, capsys, command):
+    log = tmp_path / "log.jsonl"
+    log.write_text("no decision\n")
+    new = ["--env", "probe-three-ways", *(["--port", str(free_port())] if command == "studio" else [])]
+    arguments = [str(trained), "--generation", "1"] if command == "branch" else new
+    assert main([command, *arguments, "--user", f"script={log}", "--out", str(tmp_path / "run")]) == 2
+    assert f"user: {log}, line 1 is not valid JSON" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_script_that_does_not_fit_stops_the_run_and_keeps_what_it_had(trained, tmp_path, capsys):
     log = tmp_path / "log.jsonl"
     log.write_text((trained / "decisions.jsonl").read_text().splitlines()[0] + "\n")
@@ -192,6 +280,34 @@ def test_a_script_that_does_not_fit_stops_the_run_and_keeps_what_it_had(trained,
     assert "no decision for generation 2" in capsys.readouterr().err
     assert len(rows(tmp_path / "run" / "metrics.csv")) == 2
     assert main(["show", str(tmp_path / "run")]) == 0
+
+
+def test_numbers_that_stop_being_finite_end_the_run_and_reach_no_file(tmp_path, capsys):
+    folder = tmp_path / "run"
+    sizes = [
+        *("--population.agents", "2", "--population.warmup-iterations", "1", "--population.iterations", "3"),
+        *("--ppo.environments", "2", "--ppo.rollout-steps", "4", "--ppo.minibatches", "1", "--ppo.epochs", "1"),
+        *("--ppo.hidden-sizes", "8", "--evaluation.episodes", "2", "--steps", "64"),
+    ]
+    arguments = ["train", "--env", "tests.registered:probe-faulty-later", *sizes, "--json", "--out", str(folder)]
+    assert main(arguments) == 1
+    printed = capsys.readouterr()
+    # The seventh step of an episode falls into the second rollout of four steps.
+    faults = [f"agent {agent}: reward is not finite in iteration 2" for agent in range(2)]
+    assert printed.err == f"jmorl: stopped: {'; '.join(faults)}\n"
+    warm_up = json.loads(printed.out.splitlines()[1])
+    assert (warm_up["event"], warm_up["generation"]) == ("generation", 0)
+    logs = {name: rows(folder / name) for name in ("metrics.csv", "policies.csv", "front.csv")}
+    assert [row["generation"] for row in logs["metrics.csv"]] == ["0"] and len(logs["policies.csv"]) == 2
+    numbers = [float(cell) for table in logs.values() for row in table for cell in row.values() if cell]
+    assert np.isfinite(numbers).all()
+    assert {int(row["policy"]) for row in logs["front.csv"]} == {policy["policy"] for policy in warm_up["front"]}
+    assert len(list((folder / "policies").iterdir())) == len(logs["front.csv"])
+    for path in (folder / "policies").iterdir():
+        with np.load(path) as file:
+            assert all(np.isfinite(file[name]).all() for name in file.files if name != "header")
+        assert np.isfinite(load_policy(path).header["values"]).all()
+    assert main(["show", str(folder)]) == 0
 
 
 def test_export_copies_a_policy(trained, tmp_path, capsys):
@@ -204,6 +320,34 @@ def test_export_copies_a_policy(trained, tmp_path, capsys):
     assert "exists; choose another file, or overwrite it with --force" in capsys.readouterr().err
     assert main(["export", str(trained), "--to", str(target), "--force"]) == 0
     assert load_policy(target).header["id"] == read_run(trained).chosen.id
+
+
+@pytest.mark.parametrize("command", ["train", "resume", "branch", "enautilus"])
+def test_questions_at_this_terminal_and_json_are_not_mixed(folder, tmp_path, capsys, command):
+    if command == "resume":  # of a run with such a user that has not ended
+        (folder / "result.json").unlink()
+        config = (folder / "config.toml").read_text()
+        (folder / "config.toml").write_text(config.replace("weights=0.5,0.3,0.2", "terminal"))
+    new, terminal = ["--out", str(tmp_path / "new")], ["--user", "terminal"]
+    arguments = {
+        "train": [*(argument for argument in TRAIN if argument != "--quiet"), *terminal, *new],
+        "resume": ["resume", str(folder)],
+        "branch": ["branch", str(folder), "--generation", "2", *terminal, *new],
+        "enautilus": ["enautilus", str(folder), *terminal],
+    }
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert main([*arguments[command], "--json"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.startswith("jmorl: json: questions at this terminal would stand between")
+    assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+
+def test_resuming_a_run_that_has_ended_prints_nothing_for_programs(folder, capsys, monkeypatch):
+    monkeypatch.setattr("jmorl.report.plots.draw_run", lambda *_: None)
+    for mode, said in (("--quiet", False), ("--json", True), (None, True)):
+        assert main(["resume", str(folder), *([mode] if mode else [])]) == 0
+        printed = capsys.readouterr()
+        assert printed.out == "" and ("has ended; there is nothing to resume" in printed.err) is said
 
 
 def test_branch_makes_a_run_with_another_user(trained, tmp_path, capsys):

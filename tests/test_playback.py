@@ -10,8 +10,8 @@ from PIL import Image
 
 from envs.mountain_car import CarState
 from jmorl.cli import main
+from jmorl.evaluation import evaluate_stored
 from jmorl.playback import record
-from jmorl.scoring import evaluate_stored
 from tests.probes import ThreeWays
 from tests.stored import stored_linear_policy
 

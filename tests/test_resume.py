@@ -8,12 +8,16 @@ import shutil
 import pytest
 
 import envs
+from envs import NotAsDeclared
+from jmorl.cli import main
 from jmorl.run import Decided, GenerationFinished, RunFinished, run
-from jmorl.storage.continuing import AlreadyFinished, CannotContinue, resume
+from jmorl.storage.continuing import AlreadyFinished, CannotContinue, branch, resume
 from jmorl.storage.lock import FolderInUse
 from jmorl.storage.run_folder import RunFolder
+from jmorl.storage.stored_run import read_run
 from jmorl.storage.versions import NewerFormat
-from tests.resuming import Counting, go_on, outcome, train
+from tests.probes import ThreeWays
+from tests.resuming import Counting, follow, go_on, outcome, train
 
 
 @pytest.fixture
@@ -171,6 +175,63 @@ def test_a_folder_that_cannot_be_resumed_says_why(copy, spoil, message):
     spoil(copy)
     with pytest.raises(CannotContinue, match=message):
         resume(copy)
+
+
+@pytest.fixture
+def scripted(whole, small_config, tmp_path):
+    """What the whole run was, broken off before its last question; its user is a script that is gone."""
+    script = shutil.copyfile(whole / "decisions.jsonl", tmp_path / "script.jsonl")
+    path = train(tmp_path / "scripted", small_config.replace(user=f"script={script}"), events=8)
+    script.unlink()
+    return path
+
+
+def contents(path):
+    return {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
+
+
+def test_a_run_whose_script_is_gone_says_so_and_stays_as_it_is(scripted):
+    before = contents(scripted)
+    with pytest.raises(CannotContinue, match=r"is decided by script=.*, but there is no decision log .*jmorl branch"):
+        resume(scripted)
+    assert contents(scripted) == before
+
+
+def test_a_run_whose_script_is_gone_can_be_shown_and_branched_off(scripted, tmp_path):
+    assert read_run(scripted).config.user.startswith("script=")
+    path = follow(branch(scripted, 1, tmp_path / "new", "weights=0,0,1"))
+    assert read_run(path).chosen
+
+
+def test_a_run_whose_script_is_gone_goes_on_where_it_is_not_needed(scripted, whole, small_config):
+    with resume(scripted, Counting(small_config)).folder:
+        pass  # somebody else decides
+    shutil.copyfile(whole / "decisions.jsonl", scripted / "decisions.jsonl")  # or everything is answered
+    go_on(scripted)
+    _, _, texts, _, chosen, reason = outcome(scripted)
+    _, _, texts_before, _, chosen_before, reason_before = outcome(whole)
+    assert (texts, chosen, reason) == (texts_before, chosen_before, reason_before)
+
+
+def test_a_finished_run_whose_script_is_gone_has_ended_all_the_same(whole, small_config, tmp_path, capsys):
+    script = shutil.copyfile(whole / "decisions.jsonl", tmp_path / "script.jsonl")
+    path = train(tmp_path / "scripted", small_config.replace(user=f"script={script}"))
+    script.unlink()
+    assert main(["show", str(path)]) == main(["resume", str(path)]) == 0
+    assert "nothing to resume" in "".join(capsys.readouterr())
+
+
+def test_an_environment_that_has_become_another_is_refused_and_nothing_changed(copy, monkeypatch):
+    class Short(ThreeWays):
+        def transition(self, state, action):
+            result = super().transition(state, action)
+            return result._replace(reward=result.reward[:2])
+
+    before = contents(copy)
+    monkeypatch.setattr(envs, "_registry", {ThreeWays.id: Short})
+    with pytest.raises(NotAsDeclared, match="reward has shape"):
+        resume(copy)
+    assert contents(copy) == before
 
 
 def test_a_run_is_resumed_by_one_process_at_a_time(copy):

@@ -222,6 +222,14 @@ def test_an_environment_that_is_not_as_it_declares_is_refused(small_config):
         next(run(small_config, Recorder(), Short()))
 
 
+def test_one_objective_is_nothing_to_choose_between(small_config):
+    class Single(ThreeWays):
+        objectives = ThreeWays.objectives[:1]
+
+    with pytest.raises(ValueError, match="there must be 2 objectives or more, not 1"):
+        next(run(small_config, Recorder(), Single()))
+
+
 def test_different_seeds_differ_in_every_generation(small_config):
     first, second = (generations(list(run(small_config.replace(seed=seed), Recorder()))) for seed in (1, 2))
     for one, other in zip(first, second, strict=True):

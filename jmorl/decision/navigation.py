@@ -1,6 +1,7 @@
 """E-NAUTILUS as a dialogue: questions to a decision maker until one policy is left."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import count
 
 from envs.core import Objective
@@ -10,15 +11,30 @@ from jmorl.decision.protocol import Adjust, Back, Choose, PointAnswer, PointQues
 from jmorl.search.policy import Policy, values_of
 
 
-def run_enautilus(
+@dataclass(frozen=True)
+class PointDecided:
+    """The decision maker has preferred a point, stepped back, or changed how to go on."""
+
+    question: PointQuestion
+    answer: PointAnswer
+
+
+@dataclass(frozen=True)
+class NavigationFinished:
+    """E-NAUTILUS has led to a policy."""
+
+    chosen: Policy
+
+
+def navigate(
     front: tuple[Policy, ...],
     objectives: tuple[Objective, ...],
     choose_point: Callable[[PointQuestion], PointAnswer],
     iterations: int,
     points: int,
     generation: int,
-) -> Policy:
-    """The member of the front that `choose_point`, usually a decision maker's, is led to.
+) -> Iterator[PointDecided | NavigationFinished]:
+    """Lead `choose_point`, usually a decision maker's, to a member of the front, with an event for every answer.
 
     `generation` is the archive's, and only names the questions. Raises ValueError if the front is empty, if
     `iterations` or `points` is less than 1, or if an answer is impossible.
@@ -30,8 +46,24 @@ def run_enautilus(
         if enautilus.finished(state):
             break
         question = PointQuestion(generation, number, objectives, front, state, enautilus.intermediate_points(state))
-        state = respond(question, choose_point(question))
-    return front[enautilus.result(state)]
+        answer = choose_point(question)
+        state = respond(question, answer)
+        yield PointDecided(question, answer)
+    yield NavigationFinished(front[enautilus.result(state)])
+
+
+def run_enautilus(
+    front: tuple[Policy, ...],
+    objectives: tuple[Objective, ...],
+    choose_point: Callable[[PointQuestion], PointAnswer],
+    iterations: int,
+    points: int,
+    generation: int,
+) -> Policy:
+    """The policy that `navigate` ends on."""
+    *_, last = navigate(front, objectives, choose_point, iterations, points, generation)
+    assert isinstance(last, NavigationFinished)
+    return last.chosen
 
 
 def respond(question: PointQuestion, answer: PointAnswer) -> State:

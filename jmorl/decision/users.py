@@ -28,15 +28,18 @@ KNOWN = (
 
 
 def make_user(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
-    """The decision maker that `spec` names. Raises ValueError if there is none, or if its script cannot be read."""
+    """The decision maker that `spec` names, ready to be asked.
+
+    Raises ValueError if there is none, or if its script is not there or cannot be read.
+    """
     return parse_user(spec, len(objectives))()
 
 
 def parse_user(spec: str, objectives: int | None) -> Callable[[], DecisionMaker]:
     """Check `spec` and return what makes its decision maker.
 
-    `objectives` is their number M; None if it is not known, and then nothing is checked against it. Raises
-    ValueError with a sentence saying what is wrong.
+    `objectives` is their number M; None if it is not known, and then nothing is checked against it. A script is only
+    looked for when the decision maker is made. Raises ValueError with a sentence saying what is wrong.
     """
     kind, has_value, value = spec.strip().partition("=")
     if spec.strip() in USERS:
@@ -86,12 +89,12 @@ def _target_user(value: str, objectives: int | None) -> Callable[[], DecisionMak
 
 def _scripted_user(value: str) -> Callable[[], DecisionMaker]:
     path = Path(value).expanduser()
-    if not path.is_file():
-        raise ValueError(f"there is no decision log {value!r}; write script=FILE with a file that exists")
 
     def make() -> DecisionMaker:
         from jmorl.decision.scripted import ScriptedUser
 
+        if not path.is_file():
+            raise ValueError(f"there is no decision log {value!r}: {path.absolute()} is not a file")
         return ScriptedUser(path)
 
     return make

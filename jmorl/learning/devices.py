@@ -1,9 +1,15 @@
 """Setting JAX up before its first use: CPU cores as devices, and a compilation cache on disk."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import jax
+
+
+def usable_cores() -> int:
+    """How many CPU cores this process may use; where the system does not say, those of the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def use_all_cpu_cores() -> None:
@@ -13,7 +19,8 @@ def use_all_cpu_cores() -> None:
     made through JAX's own environment variables are left alone.
     """
     if "JAX_NUM_CPU_DEVICES" not in os.environ:
-        jax.config.update("jax_num_cpu_devices", len(os.sched_getaffinity(0)))
+        with suppress(RuntimeError):  # JAX has been used
+            jax.config.update("jax_num_cpu_devices", usable_cores())
     if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
         cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "jmorl" / "jax"
         jax.config.update("jax_compilation_cache_dir", str(cache))

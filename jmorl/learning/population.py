@@ -10,6 +10,7 @@ import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
 from envs.core import Environment
+from envs.declared import check_environment
 from jmorl.config import Config
 from jmorl.learning.moppo import FAULTS, MOPPO, Diagnostics, Learner, Schedule
 from jmorl.learning.rollout import EpisodeReturns
@@ -25,11 +26,11 @@ class Population:
     """P agents trained and evaluated side by side, each call one compiled program.
 
     Learners cross this boundary as host arrays with a leading P axis, so that the search can store, mix and
-    inherit them without touching a device.
+    inherit them without touching a device. Raises NotAsDeclared for an environment that is not what it says.
     """
 
     def __init__(self, environment: Environment[Any], config: Config):
-        _check_shapes(environment)
+        check_environment(environment)
         self.size = config.population.agents
         self._compiled = False
         self.moppo = MOPPO(environment, config.ppo)
@@ -109,22 +110,6 @@ def _sharded(function: Callable[..., Any], mesh: Mesh) -> Any:
         )
 
     return jax.jit(population)
-
-
-def _check_shapes(environment: Environment[Any]) -> None:
-    """Raise ValueError, naming everything whose shape is not what the environment declares."""
-    key = jax.eval_shape(lambda: jax.random.key(0))
-    state, observation = jax.eval_shape(environment.reset, key)
-    action = jax.ShapeDtypeStruct((environment.action_size,), np.float32)
-    result = jax.eval_shape(environment.transition, state.physics, action)
-    declared = {
-        "observation": (observation.shape, (environment.observation_size,)),
-        "reward": (result.reward.shape, (len(environment.objectives),)),
-        "terminated": (result.terminated.shape, ()),
-    }
-    wrong = [f"{name} has shape {real}, not {shape}" for name, (real, shape) in declared.items() if real != shape]
-    if wrong:
-        raise ValueError(f"environment {environment.id} is not as it declares: {'; '.join(wrong)}")
 
 
 def _raise_faults(diagnostics: Diagnostics) -> None:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
@@ -32,7 +33,8 @@ LEAST_LINES = 9  # less is no plot
 class LiveView(Watcher):
     """A panel that a thread redraws, so that times tick while the run is inside a compiled call.
 
-    `clock` gives seconds, as `time.monotonic` does.
+    While a person at this terminal is asked it is gone; it comes back with the next event. `clock` gives seconds, as
+    `time.monotonic` does.
     """
 
     def __init__(
@@ -47,7 +49,7 @@ class LiveView(Watcher):
         self.console = console
         self.clock = clock
         self.timeline = Timeline(config, since=clock())  # replaced as a whole: the drawing thread reads it
-        self._live = Live(get_renderable=self.panel, console=console, refresh_per_second=REFRESH_RATE)
+        self._live = self._new()
 
     def __enter__(self) -> Self:
         self._live.start(refresh=True)
@@ -58,11 +60,25 @@ class LiveView(Watcher):
     ) -> None:
         self._live.stop()
 
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        if self.config.user.strip() == "terminal":
+            self._live.transient = True
+            self._live.stop()
+        yield
+
     def show(self, event: Event) -> None:
         self.timeline = self.timeline.after(event, self.clock())
+        if not self._live.is_started:
+            self._live = self._new()
+            self._live.start(refresh=True)
         if isinstance(event, RunFinished):
             self._live.stop()  # the panel stays as it is, above the result
             show_result(self.console, event, self.objectives)
+
+    def _new(self) -> Live:
+        """One that has drawn nothing yet: one that was stopped would draw over what came since."""
+        return Live(get_renderable=self.panel, console=self.console, refresh_per_second=REFRESH_RATE)
 
     def panel(self) -> Panel:
         """The picture of this moment."""

@@ -13,14 +13,13 @@ from jmorl.report.watchers import Json, Lines, Quiet, Watcher
 def watcher(kind: str, config: Config, objectives: tuple[Objective, ...], console: Console) -> Watcher:
     """Who shows the events of a run: `with watcher(...) as watching: watching.show(event)`.
 
-    "live" redraws a view of the run on a terminal; with a person to be asked on this terminal it becomes "lines", as it
-    would draw over the question. "lines" is one for each event. "json" goes to standard output, whatever the console
-    is. "quiet" shows nothing. Raises ValueError for another kind.
+    "live" redraws a view of the run on a terminal. "lines" is one for each event. "json" goes to standard output,
+    whatever the console is. "quiet" shows nothing. Raises ValueError for another kind.
     """
     match kind:
-        case "live" if config.user != "terminal":
+        case "live":
             return LiveView(config, objectives, console)
-        case "live" | "lines":
+        case "lines":
             return Lines(config, objectives, console)
         case "json":
             return Json(config, sys.stdout)

@@ -3,6 +3,7 @@
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from types import TracebackType
 from typing import Any, Self, TextIO
@@ -29,6 +30,10 @@ class Watcher(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         return None
+
+    def asking(self) -> AbstractContextManager[object]:
+        """While somebody is asked on the same screen, leave it alone."""
+        return nullcontext()
 
     @abstractmethod
     def show(self, event: Event) -> None:

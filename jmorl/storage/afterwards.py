@@ -7,8 +7,8 @@ enautilus.json   the policy it ended on; policies/ has its file
 from collections.abc import Sequence
 from pathlib import Path
 
-from jmorl.decision.navigation import run_enautilus
-from jmorl.decision.protocol import DecisionMaker, PointAnswer, PointQuestion
+from jmorl.decision.navigation import NavigationFinished, PointDecided, navigate
+from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import PointRecord, point_record, to_json
 from jmorl.search.policy import Policy
 from jmorl.storage.files import write_json, write_text
@@ -20,16 +20,14 @@ def choose_afterwards(run: StoredRun, user: DecisionMaker, iterations: int, poin
 
     The dialogue replaces an earlier one only when it has come to its end.
     """
-    records: list[PointRecord] = []
-
-    def asked(question: PointQuestion) -> PointAnswer:
-        answer = user.choose_point(question)
-        records.append(point_record(question, answer))
-        return answer
-
     generation = int(run.metrics["generation"][-1])
-    chosen = run_enautilus(run.front, run.objectives, asked, iterations, points, generation)
-    keep_dialogue(run.path, records, chosen)
+    records = []
+    for event in navigate(run.front, run.objectives, user.choose_point, iterations, points, generation):
+        match event:
+            case PointDecided(question, answer):
+                records.append(point_record(question, answer))
+            case NavigationFinished(chosen):
+                keep_dialogue(run.path, records, chosen)
     return chosen
 
 

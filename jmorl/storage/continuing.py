@@ -6,10 +6,14 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import envs
+from envs.core import Environment
+from envs.declared import check_environment
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
+from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
 from jmorl.learning.population import Population
@@ -47,6 +51,7 @@ class Continued:
     folder: RunFolder
     state: RunState | None  # None: from the beginning
     notes: tuple[str, ...] = ()  # what somebody should know about it, sentences
+    user: DecisionMaker | None = None  # who decides; None: as the config says
 
     def events(
         self,
@@ -56,28 +61,31 @@ class Continued:
     ) -> Iterator[Event]:
         """Run on, recording every event before it is passed on; answers that the log has are not asked for again.
 
-        `user` defaults to that of the config, and is asked within `asking()`; `population` is as in `run`.
+        `user` takes the place of the run's own, and is asked within `asking()`; `population` is as in `run`.
         """
         config, environment = self.folder.config, self.folder.environment
-        user = user or make_user(config.user, environment.objectives)
+        user = user or self.user or make_user(config.user, environment.objectives)
         remembered = Remembered(user, self.folder.decisions.ahead, asking)
         for event in run(config, remembered, environment, self.state, population):
             self.folder.record(event)
             yield event
 
 
-def resume(path: Path) -> Continued:
+def resume(path: Path, user: DecisionMaker | None = None) -> Continued:
     """Take up a run from its last good checkpoint, or from the beginning if it has none yet.
 
     Logs that are ahead of the checkpoint are cut back to it, but answers are kept, and what a killed process left
-    half-written is deleted. Raises CannotContinue, FolderInUse and NewerFormat, having changed nothing.
+    half-written is deleted. `user` takes the place of the config's, who then need not be there any more. Raises
+    CannotContinue, FolderInUse, NewerFormat and NotAsDeclared, having changed nothing.
     """
     manifest, config = _read_start(path)
     if (path / "result.json").exists():
         _tidy(path)
         raise AlreadyFinished(f"the run in {path} has ended; there is nothing to resume")
+    environment = _environment(config)
+    user = user or _its_user(path, config, environment)
     with _locked(path) as lock:
-        found, notes = _last_good(path, manifest, config)
+        found, notes = _last_good(path, manifest, config, environment)
         if found is None and manifest.get("parent"):
             raise CannotContinue(
                 f"{path} has no checkpoint to go on from; branch off {manifest['parent']['name']} again"
@@ -85,24 +93,26 @@ def resume(path: Path) -> Continued:
             )
         if lock.previous:
             notes.append(f"{lock.previous}, is gone without having finished; its run goes on here")
-        folder = _opened(path, config, lock, manifest)
+        folder = _opened(path, config, environment, lock, manifest)
         state = _restore(folder, found, notes)
         _note_resumption(folder, state, notes)
-        return Continued(folder, state, tuple(notes))
+        return Continued(folder, state, tuple(notes), user)
 
 
 def branch(path: Path, generation: int, out: Path, user: str | None = None, force: bool = False) -> Continued:
     """Make a new run, in the folder `out`, that begins where a run was after a generation.
 
     It has the earlier run's logs up to there and decides for itself from then on, at once; `user` says who, if not as
-    before. Raises CannotContinue, FolderInUse, NewerFormat and, if the user does not fit, ConfigError.
+    before. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or has a script
+    that cannot be read, ConfigError; nothing is made then.
     """
     manifest, config = _read_start(path)
-    environment = envs.make(config.env)
-    checkpoint = _the_checkpoint(path, generation)
-    state = replace(unpack(checkpoint.state, config, environment), silent_generations=0)
-    parent = {"run": manifest["run"], "name": path.resolve().name, "generation": generation}
     config = config.replace(user=user) if user else config
+    environment = _environment(config)
+    decision_maker = _new_user(config, environment)
+    checkpoint = _the_checkpoint(path, generation, manifest)
+    state = replace(_unpacked(path, checkpoint, config, environment), silent_generations=0)
+    parent = {"run": manifest["run"], "name": path.resolve().name, "generation": generation}
     check_free(out, force)
     if out.resolve() in (path.resolve(), *path.resolve().parents):
         raise FolderInUse(f"{out} holds the run that is branched off; choose another folder")
@@ -115,7 +125,7 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
         _restore_front(folder, state)
         folder.checkpoints.save(state, folder.logs())
         folder.checkpoints.wait()
-        return Continued(folder, state)
+        return Continued(folder, state, user=decision_maker)
     except BaseException:
         folder.close()
         raise
@@ -145,6 +155,44 @@ def _read_start(path: Path) -> tuple[Manifest, Config]:
     return manifest, config
 
 
+def _environment(config: Config) -> Environment[Any]:
+    environment = envs.make(config.env)
+    check_environment(environment)
+    return environment
+
+
+def _its_user(path: Path, config: Config, environment: Environment[Any]) -> DecisionMaker:
+    """Who decides in a run that has begun. A script that is gone is not missed where everything is answered."""
+    log = path / "decisions.jsonl"
+    try:
+        return make_user(config.user, environment.objectives)
+    except ValueError as error:
+        if _is_answered(log):
+            return make_user(f"script={log}", environment.objectives)
+        raise CannotContinue(
+            f"the run in {path} is decided by {config.user}, but {error}; put that right, or let another user decide "
+            f"in a branch: jmorl branch {path} --generation K --out NEW --user USER"
+        ) from error
+
+
+def _is_answered(log: Path) -> bool:
+    """Whether a decision log goes to the end of its run."""
+    try:
+        records = read_log(log)
+    except ScriptError:
+        return False
+    last = records[-1] if records else None
+    return isinstance(last, DecisionRecord) and (last.purpose == "final" or last.stop)
+
+
+def _new_user(config: Config, environment: Environment[Any]) -> DecisionMaker:
+    """Who decides in a run that begins. Raises ConfigError."""
+    try:
+        return make_user(config.user, environment.objectives)
+    except ValueError as error:
+        raise ConfigError([f"user: {error}"]) from error
+
+
 def _tidy(path: Path) -> None:
     """Delete what a process left that was killed after the end of its run, if the folder may be written."""
     try:
@@ -169,42 +217,56 @@ def _locked(path: Path) -> Iterator[RunLock]:
         raise
 
 
-def _opened(path: Path, config: Config, lock: RunLock, manifest: Manifest) -> RunFolder:
+def _opened(path: Path, config: Config, environment: Environment[Any], lock: RunLock, manifest: Manifest) -> RunFolder:
     remove_partial(path)
     (path / "policies").mkdir(exist_ok=True)
-    return RunFolder(path, config, envs.make(config.env), lock, manifest)
+    return RunFolder(path, config, environment, lock, manifest)
 
 
 Found = tuple[Checkpoint, RunState]
 
 
-def _last_good(path: Path, manifest: Manifest, config: Config) -> tuple[Found | None, list[str]]:
+def _last_good(
+    path: Path, manifest: Manifest, config: Config, environment: Environment[Any]
+) -> tuple[Found | None, list[str]]:
     """The last checkpoint that is whole, and its state; None if there is none; and what is wrong with later ones."""
     notes: list[str] = []
-    folder = path / "checkpoints"
-    for generation in reversed(stored_generations(folder)):
+    for generation in reversed(stored_generations(path / "checkpoints")):
         try:
-            checkpoint = read_checkpoint(folder, generation)
-            if checkpoint.run != manifest["run"]:
-                raise DamagedCheckpoint(f"{checkpoint_path(folder, generation)} belongs to another run")
-            return (checkpoint, unpack(checkpoint.state, config, envs.make(config.env))), notes
+            checkpoint = _own_checkpoint(path, generation, manifest)
+            return (checkpoint, _unpacked(path, checkpoint, config, environment)), notes
         except DamagedCheckpoint as error:
             notes.append(str(error))
-        except PackingError as error:
-            raise CannotContinue(f"{checkpoint_path(folder, generation)} does not fit this jmorl: {error}") from error
     return None, notes
 
 
-def _the_checkpoint(path: Path, generation: int) -> Checkpoint:
-    """The checkpoint of a generation, for a branch."""
+def _own_checkpoint(path: Path, generation: int, manifest: Manifest) -> Checkpoint:
+    """A checkpoint of the run in a folder. Raises DamagedCheckpoint, for one of another run, too."""
     folder = path / "checkpoints"
-    stored = stored_generations(folder)
+    checkpoint = read_checkpoint(folder, generation)
+    if checkpoint.run != manifest["run"]:
+        raise DamagedCheckpoint(f"{checkpoint_path(folder, generation)} belongs to another run")
+    return checkpoint
+
+
+def _unpacked(path: Path, checkpoint: Checkpoint, config: Config, environment: Environment[Any]) -> RunState:
+    """The state in a checkpoint. Raises CannotContinue if the run has no such states now."""
+    try:
+        return unpack(checkpoint.state, config, environment)
+    except PackingError as error:
+        place = checkpoint_path(path / "checkpoints", checkpoint.generation)
+        raise CannotContinue(f"{place} does not fit this jmorl: {error}") from error
+
+
+def _the_checkpoint(path: Path, generation: int, manifest: Manifest) -> Checkpoint:
+    """The checkpoint of a generation, for a branch."""
+    stored = stored_generations(path / "checkpoints")
     if generation not in stored:
         raise CannotContinue(
             f"{path} has no checkpoint of generation {generation}, only of: {', '.join(map(str, stored)) or 'none'}"
         )
     try:
-        return read_checkpoint(folder, generation)
+        return _own_checkpoint(path, generation, manifest)
     except DamagedCheckpoint as error:
         raise CannotContinue(f"{error}; branch off another generation") from error
 

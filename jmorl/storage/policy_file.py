@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+import envs
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
@@ -27,7 +28,7 @@ INPUT = {"variance_floor": VARIANCE_FLOOR, "clip": NORMALIZED_CLIP}
 
 
 class PolicyFileError(ValueError):
-    """A file that is no policy."""
+    """A file that is no policy, or one that cannot be used here."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,14 @@ def load_policy(path: Path | str) -> StoredPolicy:
         raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
         raise PolicyFileError(f"{path} is not a policy file: {error}") from error
+
+
+def policy_environment(environment_id: str) -> Environment[Any]:
+    """The environment that a policy's header names. Raises PolicyFileError if it cannot be made here."""
+    try:
+        return envs.make(environment_id)
+    except ValueError as error:
+        raise PolicyFileError(f"the policy needs environment {environment_id!r}: {error}") from error
 
 
 def export_policy(place: Path, policy_id: int | None, target: Path, force: bool = False) -> StoredPolicy:

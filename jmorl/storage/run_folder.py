@@ -28,6 +28,7 @@ from typing import Any, Self
 import numpy as np
 
 from envs.core import Environment
+from envs.declared import check_environment
 from jmorl.config import Config
 from jmorl.run import Decided, Event, GenerationFinished, RunFinished
 from jmorl.search.policy import Policy
@@ -69,9 +70,11 @@ class RunFolder:
     ) -> "RunFolder":
         """Make the folder, with config and manifest. Raises FolderInUse as `check_free` does, or if it cannot be made.
 
-        `parent` is as in `new_manifest`.
+        `parent` is as in `new_manifest`. Raises NotAsDeclared, having changed nothing, for an environment that is not
+        what it says.
         """
         check_free(path, force)
+        check_environment(environment)
         try:
             path.mkdir(parents=True, exist_ok=True)
             lock = RunLock(path)

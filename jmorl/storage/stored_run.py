@@ -75,13 +75,17 @@ def read_run(path: Path) -> StoredRun:
         raise
     except FileNotFoundError as error:
         raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up: {error}") from error
-    except (OSError, KeyError, IndexError, ValueError, ConfigError, ScriptError) as error:
+    except (OSError, KeyError, IndexError, TypeError, ValueError, ConfigError, ScriptError) as error:
         raise StoredRunError(f"{path} cannot be read as a run: {error}") from error
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
     with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+        rows = list(csv.DictReader(file))
+    for number, row in enumerate(rows, start=2):
+        if None in row.values():
+            raise ValueError(f"{path}, line {number} ends too early")
+    return rows
 
 
 def _columns(rows: list[dict[str, str]]) -> dict[str, np.ndarray]:

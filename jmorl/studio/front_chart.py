@@ -171,7 +171,7 @@ def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
         "showAllSymbol": True,
         "itemStyle": {"color": "transparent", "borderColor": INK, "borderWidth": 1.5},
         "lineStyle": {"color": INK, "width": 1, "type": "dotted"},
-        "label": {"show": True, "position": "left", "fontSize": 10, "color": INK},
+        "label": {"show": True, "position": "left", "distance": 12, "fontSize": 10, "color": INK},
         "labelLayout": {"hideOverlap": True},
     }
 

@@ -59,9 +59,9 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
             "min": float(low),
             "max": float(high),
             # The first axis has its numbers on its left, where no lines are.
-            "axisLabel": {**text, "inside": index == 0},
+            "axisLabel": {**text, "margin": -8, "align": "right"} if index == 0 else {**text, "margin": 8},
             "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
-            "axisTick": {"show": visible, "inside": index == 0},
+            "axisTick": {"show": visible, "length": -5 if index == 0 else 5},
         }
         for index, (objective, low, high) in enumerate(zip(view.objectives, *limits, strict=True))
     ]

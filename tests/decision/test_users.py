@@ -93,14 +93,25 @@ def test_without_a_known_number_of_objectives_any_number_passes(spec):
         ("target=1,nan", 2, "target must be finite numbers, but 'nan' is not"),
         ("target=1,", None, "target must be numbers separated by commas, but '' is none"),
         ("target=1,2,unscaled,3", None, "nothing may follow 'unscaled' in a target, but ',3' does"),
-        ("script=nowhere.jsonl", 2, "there is no decision log 'nowhere.jsonl'; write script=FILE with a file that"),
-        ("script=", 2, "there is no decision log ''"),
-        ("script=/", 2, "there is no decision log '/'"),
     ],
 )
 def test_problems(spec, objectives, problem):
     with pytest.raises(ValueError, match=problem):
         parse_user(spec, objectives)
+
+
+@pytest.mark.parametrize(
+    ("value", "problem"),
+    [
+        ("nowhere.jsonl", "there is no decision log 'nowhere.jsonl': .*/nowhere.jsonl is not a file"),
+        ("", "there is no decision log ''"),
+        ("/", "there is no decision log '/': / is not a file"),
+    ],
+)
+def test_a_script_is_looked_for_when_somebody_is_to_be_asked(objectives_of, value, problem):
+    assert callable(parse_user(f"script={value}", 2))
+    with pytest.raises(ValueError, match=problem):
+        make_user(f"script={value}", objectives_of(2))
 
 
 def test_naming_users_loads_neither_plots_nor_clustering():

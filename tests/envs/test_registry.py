@@ -39,6 +39,44 @@ def test_an_option_that_is_not_there_or_not_written_so_is_refused(id, message):
         envs.make(id)
 
 
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("import envs\n\nenvs.regster('x')", r"AttributeError: .* no attribute 'regster'.*\(broken_envs.py, line 3\)"),
+        ("def (:", r"SyntaxError: .*\(broken_envs.py, line 1\)$"),
+        ("import numpy\nnumpy.zeros(-1)", r"ValueError: .*\(broken_envs.py, line 2\)$"),
+        ("import no_such_module", "No module named 'no_such_module'$"),
+    ],
+)
+def test_a_module_that_breaks_down_is_named_with_the_line(tmp_path, monkeypatch, source, message):
+    (tmp_path / "broken_envs.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ValueError, match=f"environment 'broken_envs:x': cannot import 'broken_envs': {message}"):
+        envs.make("broken_envs:x")
+
+
+def test_options_that_an_environment_needs_are_named(monkeypatch):
+    class Sized(MountainCar):
+        def __init__(self, size, colour, wind="none"):
+            self.made = size, colour, wind
+
+    monkeypatch.setattr(envs, "_registry", {"sized": Sized})
+    with pytest.raises(ValueError, match="environment 'sized' needs size, colour: write sized,size=VALUE,colour=VALUE"):
+        envs.make("sized")
+    with pytest.raises(ValueError, match="environment 'sized' needs colour"):
+        envs.make("sized,size=3")
+    assert envs.make("sized,size=3,colour=blue").made == ("3", "blue", "none")
+
+
+def test_an_environment_that_cannot_be_made_is_named(monkeypatch):
+    class Unfinished(envs.Environment):
+        id = "unfinished"
+
+    monkeypatch.setattr(envs, "_registry", {"unfinished": Unfinished})
+    with pytest.raises(ValueError, match="environment 'unfinished' cannot be made: TypeError: .*abstract.*transition"):
+        envs.make("unfinished")
+
+
 def test_options_reach_the_factory_from_the_id_and_from_the_call(monkeypatch):
     class Sized(MountainCar):
         def __init__(self, size="1", colour="red"):

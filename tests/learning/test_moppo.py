@@ -11,7 +11,7 @@ from jmorl.learning.moppo import MOPPO, Schedule, _random_order
 from jmorl.learning.returns import discounted_sums
 from jmorl.learning.rollout import correlated_noise
 from jmorl.learning.statistics import normalize, return_scale
-from tests.probes import Clipped, Compromise, Endless, Follow, OneStep, ThreeWays, TwoSteps
+from tests.probes import Clipped, Compromise, Endless, Follow, OneStep, Onwards, ThreeWays, TwoSteps
 
 QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rate": 3e-3, "discount": 0.9}
 
@@ -24,11 +24,15 @@ def learned(environment, weights=(0.5, 0.5), iterations=40, **settings):
     return moppo, learner
 
 
+def scaled_values(moppo, learner, observations):
+    """The critic's values in reward-scaled units."""
+    x = normalize(learner.observation_statistics, jnp.asarray(observations)[:, None])
+    return moppo.critic.apply(learner.parameters["critic"], x)
+
+
 def values(moppo, learner, observations):
     """The critic's values in raw units."""
-    x = normalize(learner.observation_statistics, jnp.asarray(observations)[:, None])
-    scaled = moppo.critic.apply(learner.parameters["critic"], x)
-    return scaled * return_scale(learner.return_statistics)
+    return scaled_values(moppo, learner, observations) * return_scale(learner.return_statistics)
 
 
 @pytest.mark.parametrize("size", [1, 2, 5, 4000])
@@ -109,6 +113,26 @@ def test_weights_on_raw_objectives_are_weights_on_scaled_ones_times_the_scale():
         rtol=1e-5,
         atol=1e-6,
     )
+
+
+def test_a_truncated_step_is_bootstrapped_from_where_its_episode_ended():
+    """And not from where the next one begins, which the rollout goes on from."""
+    config = PPOConfig(environments=2, rollout_steps=25, minibatches=1, gae_lambda=0.0, weights_on="scaled")
+    moppo = MOPPO(Onwards(), config)
+
+    @jax.jit
+    def one_batch(key):
+        learner = moppo.initial_learner(key)
+        _, trajectory, _ = moppo.collect(learner, moppo.start_workers(key), key)
+        batch = moppo.batch(learner, trajectory, jnp.ones(2), jnp.array([1.0, 0.0]))
+        return trajectory, batch.advantage[:25], scaled_values(moppo, learner, jnp.arange(11.0))[:, 0]
+
+    trajectory, advantage, value = one_batch(jax.random.key(0))
+    steps = np.arange(25) % 10
+    np.testing.assert_array_equal(trajectory.observation[..., 0], np.tile(steps, (2, 1)))
+    np.testing.assert_array_equal(trajectory.truncated, np.tile(steps == 9, (2, 1)))
+    np.testing.assert_allclose(advantage, 1.0 + config.discount * value[steps + 1] - value[steps], rtol=1e-5)
+    assert abs(value[10] - value[0]) > 0.01
 
 
 def test_the_critic_learns_one_value_for_each_objective():

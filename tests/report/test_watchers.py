@@ -10,9 +10,8 @@ import pytest
 from rich.console import Console
 
 from jmorl.config import resolve
-from jmorl.report.live import LiveView
+from jmorl.report.live import REFRESH_RATE, LiveView
 from jmorl.report.progress import watcher
-from jmorl.report.watchers import Lines
 from jmorl.run import GenerationFinished, Resumed
 from tests.report.conftest import OBJECTIVES
 
@@ -99,15 +98,6 @@ def test_quiet_says_nothing(make_events, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_live_view_never_covers_a_question_at_this_terminal():
-    console = Console(file=io.StringIO(), force_terminal=True)
-    kinds = {
-        user: type(watcher("live", resolve(overrides={"user": user}), OBJECTIVES[:2], console))
-        for user in ("A", "terminal")
-    }
-    assert kinds == {"A": LiveView, "terminal": Lines}
-
-
 def test_an_unknown_kind_is_refused():
     with pytest.raises(ValueError, match="'loud'; known: live, lines, json, quiet"):
         watcher("loud", resolve(), OBJECTIVES[:2], Console())
@@ -158,16 +148,55 @@ def test_a_live_view_leaves_its_last_state_and_the_result(make_events):
     assert text.index("finished") < text.index("Final front")
 
 
-def test_a_live_view_is_redrawn_while_the_run_computes(make_events):
-    frames = threading.Semaphore(0)
+class Screen(io.StringIO):
+    """A terminal that counts the frames with a word in them."""
 
-    class Screen(io.StringIO):
-        def write(self, text):
-            if "compiling" in text:
-                frames.release()
-            return super().write(text)
+    def __init__(self, word):
+        super().__init__()
+        self.word, self.frames = word, threading.Semaphore(0)
 
-    console = Console(file=Screen(), width=80, force_terminal=True, _environ={"TERM": "xterm"})
-    with watcher("live", resolve(), OBJECTIVES[:2], console):
+    def write(self, text):
+        if self.word in text:
+            self.frames.release()
+        return super().write(text)
+
+    def watched(self, **config):
+        console = Console(file=self, width=80, height=40, force_terminal=True, _environ={"TERM": "xterm"})
+        return watcher("live", resolve(overrides=config), OBJECTIVES[:2], console)
+
+
+def test_a_live_view_is_redrawn_while_the_run_computes():
+    screen = Screen("compiling")
+    with screen.watched():
         # The main thread is stuck here, as in a compiled call, and yet frames come.
-        assert all(frames.acquire(timeout=20) for _ in range(3))
+        assert all(screen.frames.acquire(timeout=20) for _ in range(3))
+
+
+def test_a_live_view_leaves_the_screen_to_a_question_at_this_terminal_and_comes_back(make_events):
+    compiled, warm_up, decided, *_ = make_events()
+    screen = Screen("interactive")
+    with screen.watched(user="terminal") as watching:
+        for event in (compiled, warm_up):
+            watching.show(event)
+        assert screen.frames.acquire(timeout=20)
+        with watching.asking():
+            erased = screen.getvalue().rpartition("\n")[2]
+            assert erased.count("\x1b[2K") == len(watching.console.render_lines(watching.panel()))
+            while screen.frames.acquire(blocking=False):
+                pass
+            assert not screen.frames.acquire(timeout=2 / REFRESH_RATE)
+            screen.write("which of these?\n")
+        watching.show(decided)
+        assert screen.frames.acquire(timeout=20)
+    after = screen.getvalue().partition("which of these?\n")[2]
+    first_frame, *_ = after.partition("\x1b[1A")
+    assert "generation 1 of 10" in first_frame and "next question" in first_frame
+
+
+def test_a_live_view_stays_while_an_artificial_user_is_asked(make_events):
+    screen = Screen("choice for generation 1")
+    with screen.watched(user="A") as watching:
+        for event in make_events()[:2]:
+            watching.show(event)
+        with watching.asking():
+            assert all(screen.frames.acquire(timeout=20) for _ in range(3))

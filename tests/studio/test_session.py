@@ -1,6 +1,7 @@
 """A run driven beside a page: what is answered, left, taken up and branched off, without any page."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from jmorl.storage.afterwards import choose_afterwards
 from jmorl.storage.continuing import Continued, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
-from tests.resuming import follow, outcome
+from tests.resuming import follow, outcome, train
 
 
 def best(question, objective):
@@ -181,6 +182,17 @@ def test_a_finished_run_is_shown_and_can_be_branched_off(session, make_session):
     later.step_back(later.view.run, 2)
     assert later.question().generation == 2
     assert read_run(path).result is not None  # it stays as it was
+
+
+def test_a_finished_run_whose_script_is_gone_is_shown_and_stepped_back_in(whole, small_config, make_session, tmp_path):
+    script = shutil.copyfile(whole / "decisions.jsonl", tmp_path / "script.jsonl")
+    path = train(tmp_path / "run", small_config.replace(user=f"script={script}"))
+    script.unlink()
+    session = make_session()
+    session.open(path)
+    assert session.view.result
+    session.step_back(session.view.run, 2)
+    assert session.question().generation == 2
 
 
 def test_a_run_with_an_artificial_user_is_watched(compiled_once, small_config, make_session, tmp_path):

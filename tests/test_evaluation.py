@@ -11,7 +11,7 @@ import pytest
 from envs.gymnasium import original
 from envs.mountain_car import CarState, MountainCar
 from jmorl.cli import main
-from jmorl.scoring import difference_in_errors, evaluate_in_gymnasium
+from jmorl.evaluation import difference_in_errors, evaluate_in_gymnasium
 from tests.probes import ThreeWays
 from tests.stored import stored_linear_policy
 
@@ -87,6 +87,27 @@ def test_what_cannot_be_compared_is_one_clear_message(tmp_path, monkeypatch, cap
     monkeypatch.delitem(sys.modules, "envs.gymnasium")
     assert main(command) == 2
     assert "pip install 'jmorl[gymnasium]'" in capsys.readouterr().err
+
+
+def test_a_seed_that_gymnasium_would_refuse_is_refused(policy, tmp_path, capsys):
+    for command in ("evaluate", "--in", "gymnasium"), ("play", "--out", str(tmp_path / "car.gif")):
+        with pytest.raises(SystemExit) as ended:
+            main([command[0], str(tmp_path / "car.npz"), *command[1:], "--seed", "-1"])
+        assert ended.value.code == 2
+        assert "argument --seed: must be from 0 to 4294967295, not -1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["evaluate", "play"])
+def test_an_environment_that_is_not_here_is_named(policy, tmp_path, capsys, name):
+    path = tmp_path / "elsewhere.npz"
+    with np.load(tmp_path / "car.npz") as file:
+        arrays = dict(file)
+    header = json.loads(str(arrays["header"])) | {"environment": "not_here:boat-v0"}
+    np.savez(path, **arrays | {"header": np.array(json.dumps(header))})
+    assert main([name, str(path), *(["--out", str(tmp_path / "boat.gif")] if name == "play" else [])]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith("jmorl: the policy needs environment 'not_here:boat-v0': ")
+    assert "cannot import 'not_here'" in printed and not (tmp_path / "boat.gif").exists()
 
 
 def test_another_number_of_objectives_there_is_refused(policy):

@@ -1,0 +1,88 @@
+"""A stored policy on fresh episodes: in its own environment, and in MO-Gymnasium's."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import envs
+from envs.mujoco_model import quiet_mujoco
+from jmorl.learning.rollout import EpisodeReturns, episode_returns
+from jmorl.storage.policy_file import StoredPolicy, policy_environment
+
+
+class NotInGymnasium(ValueError):
+    """A policy that cannot be scored in MO-Gymnasium."""
+
+
+def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
+    """Deterministic episodes of a stored policy in its environment, one for each start key [episodes].
+
+    Another number of episodes is another compiled program: the last bits of a return may differ. Raises
+    PolicyFileError if the environment cannot be made here.
+    """
+    environment = policy_environment(policy.header["environment"])
+    discount = policy.header["discount"]
+
+    def act(observation: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return policy.mean_action(observation, jnp), jnp.asarray(policy.log_std)
+
+    def episode(key: jax.Array) -> EpisodeReturns:
+        return episode_returns(environment, act, key, discount)
+
+    returns: EpisodeReturns = jax.device_get(jax.jit(jax.vmap(episode))(keys))
+    return returns
+
+
+def evaluate_in_gymnasium(policy: StoredPolicy, episodes: int, seed: int) -> np.ndarray:
+    """Undiscounted returns [episodes, M] of deterministic episodes in MO-Gymnasium's environment of the same id.
+
+    Raises NotInGymnasium, saying what to do, without the `gymnasium` extra or such an environment there.
+    """
+    environment = _original(policy.header["environment"], len(policy.header["objectives"]))
+    with quiet_mujoco():
+        returns = [_episode_return(environment, policy, seed if index == 0 else None) for index in range(episodes)]
+    environment.close()
+    return np.stack(returns)
+
+
+def _episode_return(environment: Any, policy: StoredPolicy, seed: int | None) -> np.ndarray:  # [M]
+    observation, _ = environment.reset(seed=seed)
+    rewards, ended = [], False
+    while not ended:
+        observation, reward, terminated, truncated, _ = environment.step(policy(observation))
+        rewards.append(reward)
+        ended = terminated or truncated
+    return np.stack(rewards).sum(axis=0, dtype=np.float64)
+
+
+def _original(id: str, objectives: int) -> Any:
+    """The environment there, or NotInGymnasium."""
+    try:
+        import gymnasium
+
+        from envs.gymnasium import original
+    except ImportError as error:
+        raise NotInGymnasium(f"MO-Gymnasium is not installed ({error}): pip install 'jmorl[gymnasium]'") from error
+    try:
+        environment = original(id)
+    except (gymnasium.error.Error, ImportError) as error:
+        raise NotInGymnasium(f"MO-Gymnasium has no environment {envs.plain_id(id)!r} here: {error}") from error
+    there = environment.unwrapped.reward_space.shape[0]
+    if there != objectives:
+        raise NotInGymnasium(f"{envs.plain_id(id)!r} has {there} objectives in MO-Gymnasium, and {objectives} here")
+    return environment
+
+
+def difference_in_errors(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    """How many standard errors the mean of `theirs` [N, M] is above that of `ours` [N, M], for each objective.
+
+    NaN where both never vary or there is only one episode.
+    """
+    if min(len(ours), len(theirs)) < 2:
+        return np.full(ours.shape[1], np.nan)
+    variance = ours.var(axis=0, ddof=1) / len(ours) + theirs.var(axis=0, ddof=1) / len(theirs)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z: np.ndarray = np.where(variance > 0, (theirs.mean(axis=0) - ours.mean(axis=0)) / np.sqrt(variance), np.nan)
+    return z

@@ -1,0 +1,36 @@
+"""JAX's set-up, in processes of its own where it has to come first."""
+
+import os
+import subprocess
+import sys
+
+from jmorl.learning.devices import usable_cores
+
+
+def printed_by(program):
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
+    command = [sys.executable, "-c", program]
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout.split()
+
+
+def test_every_core_becomes_a_device():
+    program = "import jax, jmorl; jmorl.use_all_cpu_cores(); print(jax.device_count())"
+    assert printed_by(program) == [str(usable_cores())]
+
+
+def test_a_program_that_has_used_jax_keeps_its_devices_and_gets_the_cache():
+    program = (
+        "import os\nos.sched_getaffinity = lambda process: range(7)\n"
+        "import jax, jmorl\nbefore = jax.device_count()\njmorl.use_all_cpu_cores()\n"
+        "print(before, jax.device_count(), jax.config.jax_compilation_cache_dir)"
+    )
+    before, after, cache = printed_by(program)
+    assert before == after == "1" and cache.endswith("jax")
+
+
+def test_where_the_system_does_not_say_all_cores_of_the_machine_are_used(monkeypatch):
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 12)
+    assert usable_cores() == 12
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert usable_cores() == 1
