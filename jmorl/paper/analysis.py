@@ -12,6 +12,7 @@ from envs import make
 from jmorl.config import Config
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.utility import UtilityUser, linear_utility
+from jmorl.paper.drift import reached_without_drift, untrained
 from jmorl.paper.record import RunRecord
 from jmorl.search.bounds import within
 from jmorl.search.pareto import non_dominated
@@ -29,41 +30,30 @@ class Reached:
     steps: int
     seconds: float  # compilation not counted
     policy: int  # id: of those that reached it, the one that clears it by most in its tightest objective
-    without_drift: bool  # whether it had reached it in the units after the warm-up, too
+    untrained: bool  # whether none of those that reached it had been trained
+    without_drift: bool  # whether any trained policy found by then had reached it in the units after the warm-up
 
 
-def reached(record: RunRecord, target: Sequence[float]) -> Reached | None:
-    """The first generation whose archive has a policy at least as good as the target in every objective."""
+def reached(record: RunRecord, target: Sequence[float], cap: float = np.inf) -> Reached | None:
+    """The first generation whose archive has a policy at least as good as the target in every objective.
+
+    None if there is none that ends within `cap` steps.
+    """
     for number, generation in enumerate(record.generations):
         ids = np.array(generation.front)
         values = record.values[ids]
         inside = within(values, np.array(target))
-        if inside.any():
+        if generation.steps <= cap and inside.any():
             margins = np.where(inside, (values - target).min(axis=1), -np.inf)
-            policy = int(ids[np.argmax(margins)])
-            drift = drift_of(record, record.policies[policy].generation)
-            undrifted = bool((record.values[policy] * drift >= target).all())
-            return Reached(number, generation.steps, float(record.seconds[number]), policy, undrifted)
+            return Reached(
+                number,
+                generation.steps,
+                float(record.seconds[number]),
+                int(ids[np.argmax(margins)]),
+                bool(untrained(record)[ids[inside]].all()),
+                reached_without_drift(record, target, number),
+            )
     return None
-
-
-def drift_of(record: RunRecord, generation: int) -> np.ndarray:  # [M]
-    """By how much sigma has grown since the warm-up. A score divides by it, so that this takes the growth out again.
-
-    One in raw units. The correction is one of scale only: what was clipped stays so.
-    """
-    sigma = record.generations[generation].sigma
-    if None in sigma:
-        return np.ones(len(sigma))
-    first = np.array(record.generations[0].sigma, float)
-    return np.array(np.array(sigma, float) / first)
-
-
-def steps_within(config: Config, steps: int) -> int:
-    """How many steps a run really makes with a budget of `steps`: its last generation is a whole one."""
-    budget, warm_up = steps // config.steps_per_iteration, config.population.warmup_iterations
-    generations = -(-max(budget - warm_up, 0) // config.population.iterations)
-    return (warm_up + generations * config.population.iterations) * config.steps_per_iteration
 
 
 def generations_within(record: RunRecord, steps: int) -> int:
@@ -73,6 +63,11 @@ def generations_within(record: RunRecord, steps: int) -> int:
     return 1 + int((before < steps // iteration).sum())
 
 
+def seconds_within(record: RunRecord, steps: int) -> float:
+    """What the run takes within a smaller or equal budget of steps; compilation not counted."""
+    return float(record.seconds[generations_within(record, steps) - 1])
+
+
 def greatest_utility(record: RunRecord, weights: Sequence[float], steps: int) -> np.ndarray:  # [G + 1]
     """Of the archive, after each generation (the paper's U_max)."""
     utilities = record.values @ np.array(weights)
@@ -80,11 +75,19 @@ def greatest_utility(record: RunRecord, weights: Sequence[float], steps: int) ->
     return np.array([utilities[list(front)].max() for front in fronts])
 
 
-def mean_utility(record: RunRecord, weights: Sequence[float], steps: int, bounded: bool = False) -> np.ndarray:
-    """Of the performance buffer, after each generation [G + 1]: the same set for every method.
+def offspring_utility(record: RunRecord, weights: Sequence[float], steps: int) -> np.ndarray:  # [G + 1]
+    """Mean of the policies just trained, in each generation: a set that no bounds have filtered or sorted."""
+    utilities, born = record.values @ np.array(weights), record.born
+    trained = ~untrained(record)
+    return np.array([utilities[(born == g) & trained].mean() for g in range(generations_within(record, steps))])
 
-    `bounded`: of its members within the bounds only, as the authors take it for the interactive method, which favours
-    that by construction; NaN where there are none.
+
+def buffer_utility(record: RunRecord, weights: Sequence[float], steps: int, bounded: bool = False) -> np.ndarray:
+    """Mean of the performance buffer, after each generation [G + 1]: what the authors measure.
+
+    With the scale "range" the bounds decide how the interactive method's buffer is sorted, so that it is not the same
+    kind of set for every method. `bounded`: of its members within the bounds only, as the authors take it for the
+    interactive method; NaN where there are none.
     """
     utilities = record.values @ np.array(weights)
     means = []
@@ -105,17 +108,23 @@ class Finals:
     enautilus: np.ndarray  # [M]
     enautilus_kept: bool
     pooled: np.ndarray  # [N, M] PGMORL's archives, Pareto-filtered
+    runs: tuple[RunRecord, ...]  # [S] the interactive ones
+    sources: tuple[RunRecord, ...]  # whose archives are pooled
+
+    @property
+    def everything(self) -> np.ndarray:  # [S + 1, M]
+        return np.vstack([self.interactive, self.enautilus])
 
 
 def finals(
     interactive: Sequence[RunRecord], pgmorl: Sequence[RunRecord], weights: Sequence[float], steps: int
 ) -> Finals:
-    """Compare the final policies of a user with these weights."""
+    """Compare the final policies of a user with these weights, of runs that have ended."""
     pooled = pooled_front(pgmorl, steps)
-    chosen = np.stack([record.values[record.chosen] for record in interactive])
+    chosen = np.stack([record.values[record.chosen] for record in interactive if record.chosen is not None])
     navigated = pooled[_enautilus(pooled, pgmorl[0], weights)]
     both = non_dominated_or_equal(np.vstack([chosen, navigated]))
-    return Finals(chosen, both[:-1], navigated, bool(both[-1]), pooled)
+    return Finals(chosen, both[:-1], navigated, bool(both[-1]), pooled, tuple(interactive), tuple(pgmorl))
 
 
 def pooled_front(records: Sequence[RunRecord], steps: int) -> np.ndarray:  # [N, M]
@@ -142,49 +151,3 @@ def _enautilus(front: np.ndarray, record: RunRecord, weights: Sequence[float]) -
     chosen = run_enautilus(policies, objectives, user.choose_point, ENAUTILUS_ITERATIONS, ENAUTILUS_POINTS, 0)
     assert np.array_equal(values_of(policies)[chosen.id], front[chosen.id])
     return chosen.id
-
-
-@dataclass(frozen=True)
-class Mechanism:
-    """Why a search gets on or not: medians and means over the generations of runs, the warm-up left out."""
-
-    candidates: float  # median number of policies that could be continued
-    alone: float  # share of generations with nothing but the choice to continue
-    repeated: float  # share of questions answered with the choice before; NaN without questions
-    predicted_gain: float  # mean over offspring and objectives, in units of the archive's final range
-    realised_gain: float
-
-
-def mechanism(records: Sequence[RunRecord]) -> Mechanism:
-    """Over all generations of the runs."""
-    candidates = [generation.candidates for record in records for generation in record.generations[1:]]
-    repeated: list[bool] = []
-    predicted: list[float] = []
-    realised: list[float] = []
-    for record in records:
-        chosen = [question.chosen for question in record.questions]
-        repeated += [one == other for one, other in zip(chosen, chosen[1:], strict=False)]
-        front = record.values[list(record.generations[-1].front)]
-        span = np.where(np.ptp(front, axis=0) > 0, np.ptp(front, axis=0), 1.0)
-        for policy in record.policies:
-            if policy.predicted is not None and policy.parent is not None:
-                before = record.values[policy.parent]
-                predicted.append(float(((np.array(policy.predicted) - before) / span).mean()))
-                realised.append(float(((np.array(policy.values) - before) / span).mean()))
-    return Mechanism(
-        float(np.median(candidates)) if candidates else np.nan,
-        float(np.mean(np.array(candidates) <= 1)) if candidates else np.nan,
-        float(np.mean(repeated)) if repeated else np.nan,
-        float(np.mean(predicted)) if predicted else np.nan,
-        float(np.mean(realised)) if realised else np.nan,
-    )
-
-
-def questions_asked(records: Sequence[RunRecord]) -> float:
-    """Mean over runs, the final question included."""
-    return float(np.mean([len(record.questions) for record in records]))
-
-
-def seconds_between_questions(records: Sequence[RunRecord]) -> float:
-    """Median time a person would have waited from an answer to the next question: one generation."""
-    return float(np.median([each.seconds for record in records for each in record.generations[1:]] or [np.nan]))

@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.console import Console
 
 from jmorl.display.text import duration, short_count
-from jmorl.learning.population import TrainingFault
-from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, Cell, Plan, distinct, in_order
+from jmorl.paper.naming import named
+from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, SHORTER, Cell, Plan, distinct, in_order
 from jmorl.paper.report import Scope, write_report
 from jmorl.paper.runner import Places, known, make, missing
 from jmorl.paper.targets import propose
@@ -35,9 +35,13 @@ def make_paper(
     out = out or Path("runs/paper-quick" if quick else "benchmarks/paper")
     places = Places(out / "records", work or (out / "work" if quick else Path("runs/paper")))
     items = [item for item in ITEMS.values() if only is None or item.name in only]
-    parts = [_Part(item.name, each, plan.cells(item, each)) for item, each in in_order(items, units)]
+    wanted = [(item, each, plan.cells(item, each)) for item, each in in_order(items, units)]
+    parts = [_Part(item.name, each, [cell for cell in cells if not cell.later]) for item, each, cells in wanted]
     if only and "targets" in only:
         parts.append(_Part(f"targets, {NAMES[CHEETAH]}", "raw", plan.pilots(CHEETAH)))
+    for item, each, cells in wanted:
+        later = [cell for cell in cells if cell.later]
+        parts += [_Part(f"{item.name}, {named(SHORTER)}", each, later)] if later else []
     if run:
         _make_all(parts, places, console)
     if only and "targets" in only:
@@ -66,10 +70,7 @@ def _make_all(parts: Sequence[_Part], places: Places, console: Console) -> None:
             todo = missing(part.cells, places)
             started, steps = time.monotonic(), 0
             for number, cell in enumerate(todo, start=1):
-                try:
-                    steps += _make_one(cell, places, f"{name}, {number} of {len(todo)}", console, stop)
-                except TrainingFault as fault:  # it would break down again; the others need not wait for it
-                    _say(console, f"  {name}: {cell.key} broke down: {fault}")
+                steps += _make_one(cell, places, f"{name}, {number} of {len(todo)}", console, stop)
             spent = duration(time.monotonic() - started)
             _say(console, f"{name}: {len(todo)} runs, {short_count(steps)} steps, {spent}" if todo else f"{name}: done")
 
@@ -88,9 +89,10 @@ def _make_one(cell: Cell, places: Places, name: str, console: Console, stop: Sto
 
         record = make(cell, places, watch)
     spent = duration(time.monotonic() - started)
-    _say(console, f"  {name}: {cell.key}, {short_count(record.steps[-1])} steps, {spent}")
+    fault = f", broke down: {record.fault}" if record.fault else ""
+    _say(console, f"  {name}: {cell.key}, {short_count(record.total_steps)} steps, {spent}{fault}")
     stop.check()
-    return int(record.steps[-1])
+    return record.total_steps
 
 
 def _say(console: Console, text: str) -> None:

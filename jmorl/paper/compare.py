@@ -11,7 +11,6 @@ from jmorl.config import Config, resolve
 from jmorl.decision.protocol import Answer, DecisionMaker, Question
 from jmorl.decision.target import TargetUser
 from jmorl.paper import markdown
-from jmorl.paper.analysis import steps_within
 from jmorl.paper.plan import Cell
 from jmorl.paper.record import read_record
 from jmorl.paper.results import TargetRow, compared, target_row
@@ -68,8 +67,10 @@ def compare(
 
     A run ends when a policy is at least as good as the target in every objective, or with the budget of its config. The
     folder `out` keeps the runs, so that a second call only makes what is missing, and gets `REPORT.md` with the tables.
-    Methods with other numbers of agents or steps per generation may be compared; intervals are over seeds.
+    Methods with other numbers of agents or steps per generation may be compared; intervals are over seeds. A run that
+    breaks down counts as not reaching what it had not reached. Raises ValueError if the budgets are not equal.
     """
+    budget = _budget(methods)
     places = Places(out / "records", out / "work")
     rows = []
     for target, values in targets.items():
@@ -78,11 +79,19 @@ def compare(
             for cell in missing(cells, places):
                 make(cell, places, lambda *_: None, partial(_user, method, values))
             records = [read_record(places.record(cell)) for cell in cells]
-            budget = steps_within(cells[0].config, cells[0].config.steps)
             rows.append(target_row(target, values, name, seeds, records, budget))
     comparison = Comparison(tuple(rows))
     write_text(out / "REPORT.md", comparison.markdown())
     return comparison
+
+
+def _budget(methods: Mapping[str, Method]) -> int:
+    """The one budget of all methods: with others, steps used would be censored at different places."""
+    budgets = {name: method.config.steps for name, method in methods.items()}
+    if len(set(budgets.values())) != 1:
+        told = ", ".join(f"{name} {steps}" for name, steps in budgets.items()) or "none"
+        raise ValueError(f"methods are compared within one budget of steps; theirs are: {told}")
+    return next(iter(budgets.values()))
 
 
 def _cell(environment: str, name: str, method: Method, target: str, values: Sequence[float], seed: int) -> Cell:

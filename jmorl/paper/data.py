@@ -1,9 +1,10 @@
 """What is known beforehand: the published numbers, and what the experiment in raw units fixed."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from typing import ClassVar
 
 from pydantic import TypeAdapter
 
@@ -14,12 +15,19 @@ Targets = Mapping[str, tuple[float, ...]]  # name -> [M]
 class PublishedRow:
     """One line of Table 1 or 2. A mean counts a run that timed out at the cap; None: no run succeeded."""
 
+    RUNS: ClassVar[int] = 5
+
     target: str
     method: str
     mean_steps: float | None
     std_steps: float | None
     seconds: float
     timeouts: int
+    std_printed: float | None = None  # where `std_steps` is not what the paper prints
+
+    @property
+    def successes(self) -> int:
+        return self.RUNS - self.timeouts
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,20 @@ class PublishedTable:
         """The restricted mean: without a success, the cap."""
         return self.row(target, method).mean_steps or self.cap_steps
 
+    @property
+    def seconds(self) -> float:
+        """Of all runs."""
+        return sum(row.seconds * row.RUNS for row in self.rows)
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What the text says of a figure."""
+
+    text: str
+    ahead: Mapping[str, str] = field(default_factory=dict)  # user -> the method that ends higher, or "comparable"
+    also: tuple[str, ...] = ()  # names of other statements, see `jmorl.paper.claims`
+
 
 @dataclass(frozen=True)
 class Published:
@@ -45,7 +67,7 @@ class Published:
 
     source: str
     tables: Mapping[str, PublishedTable]
-    claims: Mapping[str, Mapping[str, str]]
+    claims: Mapping[str, Claims]
 
 
 @dataclass(frozen=True)

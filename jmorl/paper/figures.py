@@ -3,9 +3,10 @@
 Methods differ by colour, line and mark; users by their panel.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,18 +19,21 @@ from envs import make
 from jmorl.display.limits import core
 from jmorl.display.text import objective_label
 from jmorl.paper.analysis import Finals
-from jmorl.paper.plan import NAMES, Item, Plan
+from jmorl.paper.plan import NAMES, SHORTER, Item, Plan
 from jmorl.paper.results import Curves, Records, TargetRow, curves, final_policies, target_rows
-from jmorl.report.style import BLUE, INK, ORANGE, PALE, legend_below, new_figure, style
+from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, legend_below, new_figure, style
 from jmorl.storage.files import written_whole
 from jmorl.units import measured_in
 
 LOOKS: dict[str, tuple[Any, ...]] = {  # colour, line, mark and name
     "interactive": (BLUE, "-", "o", "interactive"),
     "pgmorl": (ORANGE, "--", "s", "PGMORL"),
+    SHORTER: (GREEN, ":", "D", "PGMORL, warm-up 40"),
 }
 FORMATS = ("png", "svg")
+DOTS_PER_INCH = 300  # for print
 WIDTH = 10.5  # inches, three panels
+STACK = 0.2  # of the distance of two lines
 
 
 def draw(folder: Path, plan: Plan, item: Item, units: Sequence[str], records: Records) -> dict[str, Path]:
@@ -47,7 +51,8 @@ def _save(figure: Figure, path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     for form in FORMATS:
         with written_whole(path.with_suffix(f".{form}")) as temporary:
-            figure.savefig(temporary, format=form, metadata={"Date": None} if form == "svg" else None)
+            metadata = {"Date": None} if form == "svg" else None
+            figure.savefig(temporary, format=form, dpi=DOTS_PER_INCH, metadata=metadata)
     return path.with_suffix(".png")
 
 
@@ -61,7 +66,11 @@ def _figure(plan: Plan, item: Item, units: str, records: Records) -> Figure | No
         normalised = ", normalised utilities" if item.normalised else ""
         return finals_figure(found, item, units, f"Final policies: {title}{normalised}") if found else None
     rows_of = curves(plan, item, units, records)
-    what = "Greatest utility of the archive" if item.kind == "greatest utility" else "Mean utility of the population"
+    what = (
+        "Greatest utility of the archive"
+        if item.kind == "greatest utility"
+        else "Mean utility of the policies just trained"
+    )
     return curves_figure(rows_of, item, units, f"{what}: {title}") if rows_of else None
 
 
@@ -96,11 +105,20 @@ def _draw_curve(axes: Axes, row: Curves) -> None:
 
 
 def _focus(axes: Axes, utilities: Sequence[np.ndarray]) -> None:
-    """Leave the worst of the first generations out of sight, where they would hide all that follows."""
+    """Leave the worst of the first generations out of sight, where they would hide all that follows, and say so."""
     later = np.concatenate([each[:, each.shape[1] // 4 :].ravel() for each in utilities])
     low, high = later.min(), max(each.max() for each in utilities)
     margin = 0.08 * (high - low or abs(high) or 1.0)
     axes.set_ylim(low - 3 * margin, high + margin)
+    lowest = min(each.min() for each in utilities)
+    if lowest < low - 3 * margin:
+        _note(axes, f"not shown: the beginning, down to {lowest:.4g}")
+
+
+def _note(axes: Axes, text: str, place: Literal["left", "right"] = "right") -> None:
+    """What a picture cuts off, in a lower corner."""
+    x = 0.02 if place == "left" else 0.98
+    axes.annotate(text, (x, 0.02), xycoords="axes fraction", ha=place, va="bottom", fontsize=8, color=GREY)
 
 
 def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:
@@ -113,10 +131,10 @@ def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:
         mean = row.times.restricted_mean
         axes.plot([mean.low, mean.high], [place, place], dashes, color=colour, linewidth=2.4, solid_capstyle="butt")
         axes.plot([mean.mean] * 2, [place - 0.24, place + 0.24], color=colour, linewidth=2.4)
-        for steps in row.times.reached:
-            filled = steps is not None
-            x = row.times.budget if steps is None else steps
-            axes.plot(x, place, mark, color=colour, markersize=6, markerfacecolor=colour if filled else "white")
+        heights = stacked(row.times.restricted)
+        for steps, x, height in zip(row.times.reached, row.times.restricted, heights, strict=True):
+            face, edge = ("white", colour) if steps is None else (colour, "white")
+            axes.plot(x, place + height, mark, markersize=6, markerfacecolor=face, markeredgecolor=edge, zorder=3)
     axes.set_yticks(places, [f"{row.target}, {LOOKS.get(row.method, ('', '', '', row.method))[3]}" for row in rows])
     axes.set_ylim(max(places) + 0.6, min(places) - 0.6)
     axes.grid(axis="y", visible=False)
@@ -132,6 +150,16 @@ def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:
     return figure
 
 
+def stacked(values: Sequence[float]) -> list[float]:  # [S]
+    """How far from the middle of its line each value is drawn, so that equal ones do not hide each other."""
+    total, seen = Counter(values), Counter[float]()
+    heights = []
+    for value in values:
+        heights.append(STACK * (seen[value] - (total[value] - 1) / 2))
+        seen[value] += 1
+    return heights
+
+
 def _places(rows: Sequence[TargetRow]) -> list[float]:
     """Where each row is drawn: targets apart from each other."""
     order = list(dict.fromkeys(row.target for row in rows))
@@ -144,10 +172,13 @@ def finals_figure(found: Mapping[str, Finals], item: Item, units: str, title: st
     grid = list(figure.subplots(1, len(found), squeeze=False, sharex=True, sharey=True)[0])
     x, y = measured_in(units, make(item.env).objectives)
     for axes, (user, finals) in zip(grid, found.items(), strict=True):
-        axes.scatter(*finals.pooled[core(finals.pooled)].T, s=14, color=PALE, zorder=1)
+        near = core(finals.pooled)
+        axes.scatter(*finals.pooled[near].T, s=14, color=PALE, zorder=1)
+        if not near.all():
+            _note(axes, f"not shown: far policies of the pooled front, {int((~near).sum())}", "left")
         for values, kept in zip(finals.interactive, finals.kept, strict=True):
             axes.scatter(*values, s=62, marker="^", **_face(BLUE, bool(kept)), zorder=3)
-        axes.scatter(*finals.enautilus, s=58, marker="s", **_face(ORANGE, finals.enautilus_kept), zorder=2)
+        axes.scatter(*finals.enautilus, s=110, marker="s", **_face(ORANGE, finals.enautilus_kept), zorder=2)
         axes.set_title(_panel(user, item))
         axes.set_xlabel(objective_label(x))
         axes.xaxis.set_major_locator(MaxNLocator(5))

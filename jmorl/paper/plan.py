@@ -15,7 +15,7 @@ from jmorl.paper.data import Targets, honest, published
 CAR, CHEETAH = "mo-mountaincarcontinuous-v0", "mo-halfcheetah-v5"
 NAMES = {CAR: "mountaincar", CHEETAH: "halfcheetah"}
 METHODS = ("interactive", "pgmorl")
-UNITS = ("raw", "paper")
+SHORTER = "pgmorl-40"  # PGMORL on HalfCheetah with the paper's warm-up, which it has no reason to wait longer for
 TARGET_SEEDS = (1, 7, 10, 42, 100)
 USER_SEEDS = (1, 42, 100)
 PILOT_SEEDS = (2, 3, 5)  # other than all of the above: targets are chosen on them
@@ -24,8 +24,8 @@ USER_STEPS = {CAR: 2_500_000, CHEETAH: 5_000_000}
 # What the authors' program does and jmorl's defaults do otherwise, where it is a setting.
 AUTHORS: Mapping[str, Any] = {
     "evaluation": {"units": "paper", "actions": "sampled", "episodes": 5},
-    "ppo": {"discount": 0.995},
-    "search": {"bounds_scale": "one", "gain_within": "front", "value_scale": "none"},
+    "ppo": {"discount": 0.995, "weights_on": "scaled"},
+    "search": {"bounds_scale": "one", "gain_within": "front", "value_scale": "none", "buffer_size": 2},
 }
 REFERENCE = {CAR: (-110.0, -110.0), CHEETAH: (-100.0, -100.0)}  # in paper units
 
@@ -35,6 +35,7 @@ QUICK: Mapping[str, Any] = {
     "ppo": {"environments": 2, "rollout_steps": 64, "minibatches": 2, "epochs": 1, "hidden_sizes": (8,)},
     "evaluation": {"episodes": 2},
 }
+SHORTER_WARM_UP = {False: 40, True: 2}  # at full size, and `quick`
 QUICK_SEEDS = (1, 7)
 QUICK_STEPS = {"users": 3 * 2 * 64 * 3, "targets": 3 * 2 * 64 * 4}
 QUICK_TARGETS = {"A": (-1e5, -1e5), "B": (-1e3, -350.0), "C": (0.0, 0.0)}  # reached at once, perhaps, and never
@@ -74,6 +75,7 @@ class Cell:
 
     key: str
     config: Config
+    later: bool = False  # made after all others
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,11 @@ class Plan:
         if self.quick and not self.seeds:
             return QUICK_SEEDS
         return self.seeds or (TARGET_SEEDS if item.kind == "steps to targets" else USER_SEEDS)
+
+    def methods(self, item: Item, units: str) -> tuple[str, ...]:
+        """The interactive one first; what comes after is what it is compared with."""
+        shorter = item.env == CHEETAH and units == "raw" and item.kind != "final policies"
+        return (*METHODS, SHORTER) if shorter else METHODS
 
     def targets(self, env: str, units: str) -> Targets | None:
         """Published in paper units; in raw ones what was fixed beforehand, None if nothing was yet."""
@@ -109,7 +116,14 @@ class Plan:
         goals = self._goals(item, units)
         seeds = self.seeds_of(item)
         cells = [self.interactive(item, units, goal, seed) for goal in goals for seed in seeds]
-        return cells + [self.pgmorl(item, units, seed) for seed in seeds]
+        baselines = self.methods(item, units)[1:]
+        return cells + [self.pgmorl(item, units, seed, method) for method in baselines for seed in seeds]
+
+    def cell(self, item: Item, units: str, method: str, goal: str, seed: int) -> Cell:
+        """The run of a method for a user or target."""
+        if method == "interactive":
+            return self.interactive(item, units, goal, seed)
+        return self.pgmorl(item, units, seed, method)
 
     def interactive(self, item: Item, units: str, goal: str, seed: int) -> Cell:
         """The run for a user, or for a target."""
@@ -118,17 +132,17 @@ class Plan:
         name = "target" if to_target else "user" if user == goal else "normalised"
         return self._cell(item.env, units, "interactive", user, f"{name}-{goal}", seed, to_target)
 
-    def pgmorl(self, item: Item, units: str, seed: int) -> Cell:
-        """The run for all users and targets.
+    def pgmorl(self, item: Item, units: str, seed: int, method: str = "pgmorl") -> Cell:
+        """The run for all users and targets; `method` may be SHORTER.
 
         With a constant learning rate a run is the beginning of a longer one, so that the longest serves for all; a
         rate that falls over the budget makes them different runs.
         """
-        longest = self._cell(item.env, units, "pgmorl", "A", "to-cap", seed, to_cap=True)
+        longest = self._cell(item.env, units, method, "A", "to-cap", seed, to_cap=True)
         ppo = longest.config.ppo
         if item.kind == "steps to targets" or ppo.learning_rate == ppo.final_learning_rate:
             return longest
-        return self._cell(item.env, units, "pgmorl", "A", "to-budget", seed, to_cap=False)
+        return self._cell(item.env, units, method, "A", "to-budget", seed, to_cap=False)
 
     def steps(self, item: Item) -> int:
         """The budget after which an item looks at a run."""
@@ -158,14 +172,17 @@ class Plan:
         return cap if to_cap else USER_STEPS[env]
 
     def _cell(self, env: str, units: str, method: str, user: str, goal: str, seed: int, to_cap: bool) -> Cell:
-        chosen = {"env": env, "method": method, "user": user, "seed": seed, "checkpoints": {"keep": 2}}
+        kind = "interactive" if method == "interactive" else "pgmorl"
+        chosen = {"env": env, "method": kind, "user": user, "seed": seed, "checkpoints": {"keep": 2}}
         config = resolve("paper" if units == "paper" else "default", None, chosen)
         if units == "paper":
             config = config.replace(**AUTHORS, reference_point=REFERENCE[env])
         if self.quick:
             config = config.replace(**QUICK)
+        if method == SHORTER:
+            config = config.replace(population={"warmup_iterations": SHORTER_WARM_UP[self.quick]})
         key = f"{NAMES[env]}-{units}-{method}-{goal}-seed-{seed}"
-        return Cell(key, config.replace(steps=self._steps(env, to_cap)))
+        return Cell(key, config.replace(steps=self._steps(env, to_cap)), method == SHORTER)
 
 
 def distinct(cells: Iterable[Cell]) -> list[Cell]:

@@ -4,7 +4,7 @@ Letters: N policies, M objectives, G generations.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+import envs
 from jmorl.config import Config
 from jmorl.decision.records import DecisionRecord
 from jmorl.run import REFERENCE_MARGIN
@@ -21,9 +22,11 @@ from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import values_of
 from jmorl.search.scaling import range_scale, search_scale
 from jmorl.storage.files import write_text
-from jmorl.storage.stored_run import StoredRun
+from jmorl.storage.manifest import read_manifest
+from jmorl.storage.stored_run import StoredRun, StoredRunError, read_run
 
 FORMAT = 1
+BROKEN = "broke down"
 DIGITS = 7  # significant ones; scores are float32 sums
 
 
@@ -61,6 +64,7 @@ class PolicyRecord:
     values: tuple[float, ...]  # [M] in the run's units
     predicted: tuple[float, ...] | None  # [M]
     raw: tuple[float, ...]  # [M] mean undiscounted return, whatever the run's units
+    discounted: tuple[float, ...] | None = None  # [M] mean discounted raw return; in paper units only
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ class QuestionRecord:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """A finished run."""
+    """A run that has ended, or one that broke down and has what it had until then, perhaps no generation at all."""
 
     digest: str  # of its config
     config: dict[str, Any]
@@ -82,11 +86,12 @@ class RunRecord:
     commit: str | None
     device: str
     reason: str  # why it ended
-    chosen: int  # id of its result
+    chosen: int | None  # id of its result; None if it broke down
     generations: tuple[GenerationRecord, ...]  # [G + 1]
     questions: tuple[QuestionRecord, ...]
     policies: tuple[PolicyRecord, ...]
     format: int = FORMAT
+    fault: str | None = None  # why it broke down
 
     @cached_property
     def values(self) -> np.ndarray:  # [N, M]
@@ -98,6 +103,11 @@ class RunRecord:
         """The mean undiscounted returns of all policies, by id."""
         return np.array([policy.raw for policy in self.policies])
 
+    @cached_property
+    def born(self) -> np.ndarray:  # [N]
+        """The generations of all policies, by id."""
+        return np.array([policy.generation for policy in self.policies])
+
     @property
     def steps(self) -> np.ndarray:  # [G + 1]
         return np.array([generation.steps for generation in self.generations])
@@ -106,6 +116,18 @@ class RunRecord:
     def seconds(self) -> np.ndarray:  # [G + 1]
         """Since the start, compilation not counted."""
         return np.cumsum([generation.seconds for generation in self.generations])
+
+    @property
+    def total_steps(self) -> int:
+        return self.generations[-1].steps if self.generations else 0
+
+    @property
+    def total_seconds(self) -> float:
+        return float(self.seconds[-1]) if self.generations else 0.0
+
+    @property
+    def in_paper_units(self) -> bool:
+        return any(None not in generation.sigma for generation in self.generations)
 
     def bounds(self, generation: int) -> np.ndarray:  # [M]
         """Those in force in a generation, -inf where there were none."""
@@ -119,6 +141,32 @@ def record_of(run: StoredRun) -> RunRecord:
     """What is kept of a run folder. Raises RecordError for a run that has not ended."""
     if run.result is None or run.chosen is None:
         raise RecordError(f"the run in {run.path} has not ended")
+    return _record(run, run.result["reason"], run.chosen.id)
+
+
+def broken_record(path: Path, config: Config, fault: str) -> RunRecord:
+    """What is kept of a run folder whose run broke down."""
+    try:
+        return _record(read_run(path), BROKEN, None, fault)
+    except StoredRunError:  # it broke down in the warm-up
+        manifest = read_manifest(path)
+        names = tuple(objective.name for objective in envs.make(config.env).objectives)
+        return RunRecord(
+            digest=config.digest(),
+            config=config.model_dump(mode="json"),
+            objectives=names,
+            commit=manifest["commit"],
+            device=_device(manifest),
+            reason=BROKEN,
+            chosen=None,
+            generations=(),
+            questions=(),
+            policies=(),
+            fault=fault,
+        )
+
+
+def _record(run: StoredRun, reason: str, chosen: int | None, fault: str | None = None) -> RunRecord:
     names = [objective.name for objective in run.objectives]
     metrics = run.metrics
     generations = tuple(
@@ -143,6 +191,7 @@ def record_of(run: StoredRun) -> RunRecord:
             _vector(policy.values),
             None if policy.predicted is None else _vector(policy.predicted),
             _vector(policy.values if policy.raw is None else policy.raw),
+            None if policy.raw is None else _vector(policy.discounted),
         )
         for policy in run.policies
     )
@@ -156,12 +205,13 @@ def record_of(run: StoredRun) -> RunRecord:
         config=run.config.model_dump(mode="json"),
         objectives=tuple(names),
         commit=run.manifest["commit"],
-        device=f"{run.manifest['device']['count']} x {run.manifest['device']['kind']}",
-        reason=run.result["reason"],
-        chosen=run.chosen.id,
+        device=_device(run.manifest),
+        reason=reason,
+        chosen=chosen,
         generations=generations,
         questions=questions,
         policies=policies,
+        fault=fault,
     )
 
 
@@ -212,6 +262,10 @@ def read_record(path: Path) -> RunRecord:
 def is_record_of(path: Path, config: Config) -> bool:
     """Whether the file is there, and of a run with exactly these settings. Raises RecordError if it is unreadable."""
     return path.exists() and read_record(path).digest == config.digest()
+
+
+def _device(manifest: Mapping[str, Any]) -> str:
+    return f"{manifest['device']['count']} x {manifest['device']['kind']}"
 
 
 def _vector(values: np.ndarray) -> tuple[float, ...]:

@@ -1,42 +1,29 @@
 """REPORT.md: every published table and figure beside ours, made from the records there are."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from jmorl.display.text import duration, short_count
-from jmorl.paper import markdown, verdicts
+from jmorl.paper import claims, markdown
+from jmorl.paper.bars import drift_told, explanations, raw_bar
 from jmorl.paper.data import PublishedTable, honest, published
 from jmorl.paper.figures import draw
-from jmorl.paper.plan import NAMES, Cell, Item, Plan, distinct, in_order
+from jmorl.paper.introduction import DEVIATIONS, DIFFERENT_UNITS, INTRODUCTION, MEAN_UTILITY, POOLED, SWAPPED
+from jmorl.paper.plan import ITEMS, NAMES, Item, Plan
 from jmorl.paper.results import Records, TargetRow, curves, final_policies, target_rows
+from jmorl.paper.state import state
+from jmorl.paper.verdicts import MISSING, table_verdict, target_verdict
 from jmorl.storage.files import write_text
 
 TITLES = {
     "steps to targets": "steps until a target is reached",
     "greatest utility": "greatest utility of the archive",
-    "mean utility": "mean utility of the population, the performance buffer",
+    "mean utility": "mean utility of the policies just trained",
     "final policies": "final policies, interactive and by E-NAUTILUS",
 }
 
-INTRODUCTION = """Made by `jmorl paper` from the records in `records/`; nothing here is written by hand.
 
-The paper's experiments are repeated twice. In **raw units** a score is a mean undiscounted return with deterministic
-actions, which means the same in every run and at every time; methods have this project's default settings, and targets
-were fixed beforehand. In **paper units** policies are scored as the authors' program scores them, with sampled actions,
-by rewards divided by a running deviation (sigma) that every policy scored so far has moved; settings and targets are
-the published ones. Such units drift: fixed policies reach targets with nothing learned (`python -m benchmarks.drift`).
-What is not copied are defects of that program: there the bounds take the place of the chosen policy's values, all
-policies share their observation statistics in evaluation, and the discount that is set never reaches the agents.
-
-Steps are environment steps used for learning. A run that does not reach a target is censored at its budget, so that
-mean steps are *restricted* means: steps used, time-outs at the budget. Brackets are 95 % bootstrap intervals of a mean
-over seeds. Times leave compilation out."""
-
-
-DIFFERENT_UNITS = (
-    "Values of different runs are in different units here, so that comparing them, as the paper does, means little."
-)
+BAR = "The bar: as many successes as PGMORL and as the best published row, for B and C in fewer steps."
 
 
 @dataclass(frozen=True)
@@ -51,7 +38,7 @@ class Scope:
 def write_report(folder: Path, scope: Scope, records: Records) -> Path:
     """Write REPORT.md, and its figures beside it. Runs that are missing are said to be."""
     sections = [f"# The paper's experiments{', at a reduced size' if scope.plan.quick else ''}", INTRODUCTION]
-    sections.append(_state(scope, records))
+    sections.append(state(scope.plan, scope.items, scope.units, records))
     for item in scope.items:
         drawn = draw(folder / "figures", scope.plan, item, scope.units, records)
         pictures = [f"![{item.name}, {units} units](figures/{path.name})" for units, path in drawn.items()]
@@ -68,71 +55,76 @@ def _heading(item: Item) -> str:
     return f"## {name}: {NAMES[item.env]}, {TITLES[item.kind]}{normalised}"
 
 
-def _state(scope: Scope, records: Records) -> str:
-    """What the report rests on, and what is missing."""
-    wanted = [(item, units, scope.plan.cells(item, units)) for item, units in in_order(scope.items, scope.units)]
-    cells = distinct(cell for _, _, some in wanted for cell in some)
-    there = [records[cell.key] for cell in cells if cell.key in records]
-    steps, seconds = sum(run.generations[-1].steps for run in there), sum(float(run.seconds[-1]) for run in there)
-    devices = ", ".join(sorted({run.device for run in there}))
-    lines = [f"It rests on {markdown.totals(steps, seconds, len(there))}" + (f" on {devices}." if devices else ".")]
-    lines += ["", markdown.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)), ""]
-    for item, units, some in wanted:
-        absent = sum(cell.key not in records for cell in some)
-        if absent:
-            lines.append(f"- Missing: {item.name} in {units} units, {absent} of {len(some)} runs.")
-        if not some:
-            lines.append(f"- Missing: {item.name} in {units} units, whose targets are not fixed yet.")
-    return "\n".join(lines)
-
-
-def _parts(wanted: Sequence[tuple[Item, str, Sequence[Cell]]], records: Records) -> Iterator[list[str]]:
-    """What each part took. A run that several need counts for the first of them, and what is left may be nothing."""
-    counted: set[str] = set()
-    for item, units, cells in wanted:
-        there = [records[cell.key] for cell in cells if cell.key in records and cell.key not in counted]
-        counted |= {cell.key for cell in cells}
-        steps = sum(run.generations[-1].steps for run in there)
-        seconds = sum(float(run.seconds[-1]) for run in there)
-        yield [item.name, units, str(len(there)), short_count(steps), duration(seconds)]
-
-
 def _section(scope: Scope, item: Item, records: Records) -> list[str]:
     if item.kind == "steps to targets":
         rows = {units: target_rows(scope.plan, item, units, records) for units in scope.units}
         return _table_section(published().tables[item.name], item, {u: each for u, each in rows.items() if each})
-    claims = published().claims[item.name]
-    parts = [f"The paper: {claims['text']}"]
+    parts = [f"The paper: {published().claims[item.name].text}", MEAN_UTILITY if item.kind == "mean utility" else ""]
     for units in scope.units:
-        weights = scope.plan.user_weights(item, units)
-        if item.kind == "final policies":
-            found = final_policies(scope.plan, item, units, records)
-            parts += [f"**{units} units.** {verdicts.finals_verdict(found, weights)}", _normalised(item, units)]
-            parts.append(DIFFERENT_UNITS if units == "paper" else "")
-            parts.append(markdown.final_table(found, weights) if found else "")
-        else:
-            rows_of = curves(scope.plan, item, units, records)
-            text = verdicts.curve_verdict(claims, rows_of) if rows_of else "Not to be judged yet: runs are missing."
-            parts.append(f"**{units} units.** {text}")
-            parts.append(markdown.ends(rows_of, item.kind == "mean utility") if rows_of else "")
+        make = _finals_part if item.kind == "final policies" else _curves_part
+        parts += make(scope.plan, item, units, records)
+    return parts
+
+
+def _curves_part(plan: Plan, item: Item, units: str, records: Records) -> list[str]:
+    rows = curves(plan, item, units, records)
+    checks = claims.curve_checks(published().claims[item.name], rows)
+    return [
+        f"**{units} units.** {claims.conclusion(checks)}",
+        DIFFERENT_UNITS if units == "paper" else "",
+        markdown.ends(rows) if rows else "",
+        markdown.waits(rows, plan.steps(item)) if rows else "",
+    ]
+
+
+def _finals_part(plan: Plan, item: Item, units: str, records: Records) -> list[str]:
+    found = final_policies(plan, item, units, records)
+    before = final_policies(plan, ITEMS["fig9"], units, records) if item.normalised else {}
+    checks = claims.finals_checks(published().claims[item.name], found, before)
+    parts = [f"**{units} units.** {claims.conclusion(checks)}", DIFFERENT_UNITS if units == "paper" else ""]
+    parts.append(_normalised(item, units))
+    if found:
+        weights = plan.user_weights(item, units)
+        parts += [
+            f"{claims.finals_told(found, weights)} {POOLED.format(runs=len(plan.seeds_of(item)))}",
+            markdown.final_table(found, weights),
+            markdown.final_waits(found, plan.steps(item)),
+        ]
     return parts
 
 
 def _table_section(table: PublishedTable, item: Item, rows: Mapping[str, Sequence[TargetRow]]) -> list[str]:
     """A table of steps to targets: side by side, verdicts, and in each kind of units what is behind them."""
-    parts = [markdown.side_by_side(table, rows), "Published are mean ± standard deviation; all in million steps."]
+    parts = [markdown.side_by_side(table, rows), DEVIATIONS]
+    parts.append(SWAPPED if any(row.std_printed for row in table.rows) else "")
     for units, each in rows.items():
-        targets = dict.fromkeys(row.target for row in each)
-        by_target = {name: [row for row in each if row.target == name] for name in targets}
-        parts.append(f"### In {units} units\n\n{verdicts.table_verdict(table, by_target)}")
-        parts.append("\n".join(f"- {verdicts.target_verdict(table, pair, units)}" for pair in by_target.values()))
+        by_target = {
+            name: [row for row in each if row.target == name] for name in dict.fromkeys(r.target for r in each)
+        }
+        parts.append(f"### In {units} units\n\n{table_verdict(table, by_target)}")
+        parts.append(_listed(target_verdict(table, some) for some in by_target.values()))
         if units == "raw":
+            parts.append(
+                "The bar: as many successes as PGMORL and as the best published row, for B and C in fewer steps."
+            )
+            parts.append(_listed(raw_bar(table, some) for some in by_target.values()))
             parts.append(f"The targets: {honest(item.env).targets_reason}")
+        else:
+            parts.append(_listed(drift_told(row) for row in each if row.times.successes))
+            parts.append(_explained(table, by_target))
         parts += [markdown.seed_by_seed(each), markdown.costs(each, table)]
-        if units == "paper":
-            parts.append(markdown.honesty(each))
+        parts.append(markdown.honesty(each) if units == "paper" else "")
         parts += ["What the searches were doing:", markdown.mechanisms(each)]
-    return parts
+    return parts if rows else [*parts, MISSING]
+
+
+def _explained(table: PublishedTable, rows: Mapping[str, Sequence[TargetRow]]) -> str:
+    lines = [line for some in rows.values() for line in explanations(table, some)]
+    return f"Where successes or order are not the published ones:\n\n{_listed(lines)}" if lines else ""
+
+
+def _listed(lines: Iterable[str]) -> str:
+    return "\n".join(f"- {line}" for line in lines)
 
 
 def _normalised(item: Item, units: str) -> str:

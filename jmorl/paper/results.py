@@ -1,22 +1,15 @@
 """The results of an item in one kind of units: from its cells' records, as far as there are any."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from jmorl.paper.analysis import (
-    Finals,
-    Reached,
-    finals,
-    greatest_utility,
-    mean_utility,
-    reached,
-    steps_within,
-)
-from jmorl.paper.plan import METHODS, Cell, Item, Plan
+from jmorl.paper.analysis import Finals, Reached, buffer_utility, finals, greatest_utility, offspring_utility, reached
+from jmorl.paper.drift import reached_without_drift
+from jmorl.paper.plan import METHODS, Item, Plan
 from jmorl.paper.record import RunRecord
-from jmorl.paper.statistics import Interval, Times, interval, saved
+from jmorl.paper.statistics import Difference, Times, difference, saved
 
 Records = Mapping[str, RunRecord]  # by the cell's key
 
@@ -42,27 +35,51 @@ class TargetRow:
     @property
     def seconds(self) -> float:
         """Mean time until the target was reached, or the budget used up; compilation not counted."""
-        ends = [
-            hit.seconds if hit else record.seconds[-1] for record, hit in zip(self.records, self.found, strict=True)
-        ]
-        return float(np.mean(ends))
+        runs = zip(self.records, self.found, strict=True)
+        return float(np.mean([hit.seconds if hit else record.total_seconds for record, hit in runs]))
 
     @property
     def drifted(self) -> int:
-        """How many successes are of policies that had not reached the target in the units after the warm-up."""
+        """How many successes no trained policy had in the units after the warm-up; all of untrained ones are."""
         return sum(1 for hit in self.found if hit and not hit.without_drift)
+
+    @property
+    def at_the_start(self) -> int:
+        """How many successes come with generation 0, before anything was asked or selected."""
+        return sum(1 for hit in self.found if hit and hit.generation == 0)
+
+    @property
+    def untrained(self) -> int:
+        """How many successes are of policies that were never trained."""
+        return sum(1 for hit in self.found if hit and hit.untrained)
+
+    @property
+    def prevented(self) -> int:
+        """How many runs that never arrived have a trained policy that would do in the units after the warm-up."""
+        return sum(reached_without_drift(record, self.values, len(record.generations)) for record in self.late)
+
+    @property
+    def late(self) -> list[RunRecord]:
+        """The runs that did not reach the target, without those that broke down before there was anything."""
+        runs = zip(self.records, self.found, strict=True)
+        return [record for record, hit in runs if hit is None and record.generations]
+
+    @property
+    def faults(self) -> int:
+        """How many runs broke down."""
+        return sum(record.fault is not None for record in self.records)
 
 
 def target_row(
-    target: str, values: Sequence[float], method: str, seeds: Sequence[int], records: Sequence[RunRecord], budget: int
+    target: str, values: Sequence[float], method: str, seeds: Sequence[int], records: Sequence[RunRecord], cap: int
 ) -> TargetRow:
-    """A row of at least one run; `budget` is what the runs really make."""
-    found = tuple(reached(record, values) for record in records)
-    times = Times(tuple(hit.steps if hit else None for hit in found), budget)
+    """A row of at least one run. A last generation is a whole one; what it finds after `cap` steps is too late."""
+    found = tuple(reached(record, values, cap) for record in records)
+    times = Times(tuple(hit.steps if hit else None for hit in found), cap)
     return TargetRow(target, tuple(values), method, tuple(seeds), tuple(records), found, times)
 
 
-def compared(one: TargetRow, other: TargetRow) -> Interval | None:
+def compared(one: TargetRow, other: TargetRow) -> Difference | None:
     """Steps that the first saves against the second on the seeds that both have; None if there is none."""
     common = [seed for seed in one.seeds if seed in other.seeds]
     if not common:
@@ -75,71 +92,121 @@ def _on(row: TargetRow, seeds: Sequence[int]) -> Times:
     return Times(tuple(row.times.reached[row.seeds.index(seed)] for seed in seeds), row.times.budget)
 
 
+@dataclass(frozen=True)
+class Pair:
+    """The interactive method and what it is compared with, on one target: the better row of PGMORL."""
+
+    interactive: TargetRow
+    baseline: TargetRow
+    others: tuple[TargetRow, ...]  # PGMORL's other rows
+    difference: Difference  # steps that the interactive method saves
+
+    @property
+    def rows(self) -> tuple[TargetRow, TargetRow]:
+        return self.interactive, self.baseline
+
+
+def pair_of(rows: Sequence[TargetRow]) -> Pair | None:
+    """Of the rows of one target; None if runs of one of the methods are missing.
+
+    Better is what reaches the target more often, then with fewer steps.
+    """
+    ours = [row for row in rows if row.method == "interactive"]
+    theirs = [row for row in rows if row.method != "interactive" and ours and compared(ours[0], row)]
+    if not theirs:
+        return None
+    best = max(theirs, key=lambda row: (row.times.successes / len(row.seeds), -row.times.restricted_mean.mean))
+    found = compared(ours[0], best)
+    assert found is not None
+    return Pair(ours[0], best, tuple(row for row in theirs if row is not best), found)
+
+
 def target_rows(plan: Plan, item: Item, units: str, records: Records) -> list[TargetRow]:
     """A row for each target and method that has a run."""
     rows = []
     for name, values in (plan.targets(item.env, units) or {}).items():
-        for method in METHODS:
-            cells = {seed: cell_of(plan, item, units, method, name, seed) for seed in plan.seeds_of(item)}
-            there = {seed: records[cell.key] for seed, cell in cells.items() if cell.key in records}
+        for method in plan.methods(item, units):
+            there = _there(plan, item, units, method, name, records)
             if there:
-                budget = steps_within(next(iter(cells.values())).config, plan.steps(item))
-                rows.append(target_row(name, values, method, tuple(there), tuple(there.values()), budget))
+                rows.append(target_row(name, values, method, tuple(there), tuple(there.values()), plan.steps(item)))
     return rows
 
 
-def cell_of(plan: Plan, item: Item, units: str, method: str, goal: str, seed: int) -> Cell:
-    return plan.pgmorl(item, units, seed) if method == "pgmorl" else plan.interactive(item, units, goal, seed)
+def _there(plan: Plan, item: Item, units: str, method: str, goal: str, records: Records) -> dict[int, RunRecord]:
+    """The runs there are, by seed."""
+    keys = {seed: plan.cell(item, units, method, goal, seed).key for seed in plan.seeds_of(item)}
+    return {seed: records[key] for seed, key in keys.items() if key in records}
 
 
 @dataclass(frozen=True)
 class Curves:
-    """A utility over the steps of the runs of one method, for one user."""
+    """A utility over the steps of the runs of one method, for one user. Runs that broke down are left out."""
 
     user: str
     method: str
     seeds: tuple[int, ...]  # [S]
     steps: np.ndarray  # [G + 1]
-    utility: np.ndarray  # [S, G + 1]
-    bounded: np.ndarray  # [S, G + 1] within the bounds only; the same where there are none
+    utility: np.ndarray  # [S, G + 1] of the archive's best, or the mean of the policies just trained
+    records: tuple[RunRecord, ...] = ()  # [S]
+    buffer: np.ndarray | None = None  # [S, G + 1] mean of the performance buffer, where that is the item's subject
+    bounded: np.ndarray | None = None  # [S, G + 1] and of its members within the bounds; NaN without any
 
     @property
     def last(self) -> np.ndarray:  # [S]
         return self.utility[:, -1]
 
+    @property
+    def course(self) -> np.ndarray:  # [G + 1]
+        """Mean over the seeds."""
+        return np.asarray(self.utility.mean(axis=0))
+
 
 def curves(plan: Plan, item: Item, units: str, records: Records) -> list[Curves]:
-    """For each user and method that has a run; of the archive's best, or of the buffer's mean."""
+    """For each user and method that has a run."""
     found = []
     for user, weights in plan.user_weights(item, units).items():
-        for method in METHODS:
-            cells = {seed: cell_of(plan, item, units, method, user, seed) for seed in plan.seeds_of(item)}
-            there = {seed: records[cell.key] for seed, cell in cells.items() if cell.key in records}
-            if there:
-                found.append(_curves(user, method, there, weights, item, plan.steps(item)))
+        for method in plan.methods(item, units):
+            there = _there(plan, item, units, method, user, records)
+            whole = {seed: record for seed, record in there.items() if record.fault is None}
+            if whole:
+                found.append(_curves(user, method, whole, weights, item, plan.steps(item)))
     return found
 
 
 def _curves(
     user: str, method: str, runs: Mapping[int, RunRecord], weights: Sequence[float], item: Item, steps: int
 ) -> Curves:
+    some = tuple(runs.values())
+    buffer = bounded = None
     if item.kind == "greatest utility":
-        utility = bounded = np.stack([greatest_utility(run, weights, steps) for run in runs.values()])
+        utility = np.stack([greatest_utility(run, weights, steps) for run in some])
     else:
-        utility = np.stack([mean_utility(run, weights, steps) for run in runs.values()])
-        bounded = np.stack([mean_utility(run, weights, steps, bounded=True) for run in runs.values()])
-    first = next(iter(runs.values()))
-    return Curves(user, method, tuple(runs), first.steps[: utility.shape[1]], utility, bounded)
+        utility = np.stack([offspring_utility(run, weights, steps) for run in some])
+        buffer = np.stack([buffer_utility(run, weights, steps) for run in some])
+        bounded = np.stack([buffer_utility(run, weights, steps, bounded=True) for run in some])
+    return Curves(user, method, tuple(runs), some[0].steps[: utility.shape[1]], utility, some, buffer, bounded)
 
 
-def advantage(one: Curves, other: Curves) -> Interval | None:
+def advantage(one: Curves, other: Curves) -> Difference | None:
     """How much more the first has at the end, on the seeds that both have; None if there is none."""
     pairs = [
         one.last[one.seeds.index(seed)] - other.last[other.seeds.index(seed)]
         for seed in one.seeds
         if seed in other.seeds
     ]
-    return interval(pairs) if pairs else None
+    return difference(pairs) if pairs else None
+
+
+def curve_pairs(rows: Sequence[Curves]) -> Iterator[tuple[Curves, Curves, Difference]]:
+    """For each user with runs of both: the interactive method, the row of PGMORL that ends highest, the advantage."""
+    for user in dict.fromkeys(row.user for row in rows):
+        ours = [row for row in rows if row.user == user and row.method == "interactive"]
+        theirs = [row for row in rows if row.user == user and row.method != "interactive"]
+        if ours and theirs:
+            best = max(theirs, key=lambda row: float(row.last.mean()))
+            found = advantage(ours[0], best)
+            if found:
+                yield ours[0], best, found
 
 
 def final_policies(plan: Plan, item: Item, units: str, records: Records) -> dict[str, Finals]:
@@ -147,10 +214,10 @@ def final_policies(plan: Plan, item: Item, units: str, records: Records) -> dict
     found = {}
     seeds = plan.seeds_of(item)
     for user, weights in plan.user_weights(item, units).items():
-        pair = [
-            [records.get(cell_of(plan, item, units, method, user, seed).key) for seed in seeds] for method in METHODS
-        ]
-        interactive, pgmorl = ([record for record in each if record] for each in pair)
+        interactive, pgmorl = (
+            [run for run in _there(plan, item, units, method, user, records).values() if run.fault is None]
+            for method in METHODS
+        )
         if len(interactive) == len(pgmorl) == len(seeds):
             found[user] = finals(interactive, pgmorl, weights, plan.steps(item))
     return found

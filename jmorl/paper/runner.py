@@ -1,6 +1,6 @@
 """Making the runs of a comparison: what is done is skipped, what was interrupted goes on.
 
-records/KEY.json  what is kept of a finished run
+records/KEY.json  what is kept of a run that ended or broke down; delete it, and the run is made again
 work/KEY/         its run folder, from which it is resumed
 """
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import envs
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
-from jmorl.learning.population import Population
+from jmorl.learning.population import Population, TrainingFault
 from jmorl.paper.plan import Cell
-from jmorl.paper.record import RunRecord, is_record_of, read_record, record_of, write_record
+from jmorl.paper.record import RunRecord, broken_record, is_record_of, read_record, record_of, write_record
 from jmorl.run import Event
 from jmorl.storage.continuing import AlreadyFinished, Continued, resume
 from jmorl.storage.run_folder import RunFolder
@@ -48,7 +48,8 @@ def known(cells: Sequence[Cell], places: Places) -> dict[str, RunRecord]:
 def make(cell: Cell, places: Places, watch: Watch, user: Callable[[], DecisionMaker] | None = None) -> RunRecord:
     """Make one run, or the rest of it, and keep its record. `user` defaults to the one that the config names.
 
-    What `watch` raises breaks the run off; it goes on from its last checkpoint the next time.
+    What `watch` raises breaks the run off; it goes on from its last checkpoint the next time. A run that breaks down by
+    itself would do so again: it is kept as it was until then, with its `fault`.
     """
     folder = places.work / cell.key
     try:
@@ -56,10 +57,16 @@ def make(cell: Cell, places: Places, watch: Watch, user: Callable[[], DecisionMa
     except AlreadyFinished:
         pass
     else:
-        with continued.folder:
-            for event in continued.events(user() if user else None, population=_population(cell.config)):
-                watch(cell, event)
-    record = record_of(read_run(folder))
+        try:
+            with continued.folder:
+                for event in continued.events(user() if user else None, population=_population(cell.config)):
+                    watch(cell, event)
+        except TrainingFault as fault:
+            return _kept(cell, places, broken_record(folder, cell.config, str(fault)))
+    return _kept(cell, places, record_of(read_run(folder)))
+
+
+def _kept(cell: Cell, places: Places, record: RunRecord) -> RunRecord:
     write_record(places.record(cell), record)
     return record
 

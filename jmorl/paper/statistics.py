@@ -15,17 +15,36 @@ FEWEST = 3  # values whose interval says anything
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and its bootstrap interval."""
+    """A mean and its percentile bootstrap interval: with so few values it is rather too narrow."""
 
     mean: float
     low: float
     high: float
     count: int  # values
 
+
+@dataclass(frozen=True)
+class Difference:
+    """The mean of paired differences and its t interval: few values, for which a bootstrap's is too narrow."""
+
+    mean: float
+    low: float
+    high: float
+    count: int  # values
+    agreeing: int  # values of the mean's sign
+
     @property
-    def excludes_zero(self) -> bool:
-        """Whether the sign of the mean is clear; it never is from one value or two."""
+    def clear(self) -> bool:
+        """Whether the interval excludes 0; it never does for one value or two."""
         return self.count >= FEWEST and (self.low > 0 or self.high < 0)
+
+    @property
+    def certainty(self) -> str:
+        """How sure the sign of the mean is, in words."""
+        if self.clear:
+            return "clearly"
+        agree = self.count >= FEWEST and self.agreeing == self.count
+        return f"not clearly, though all {self.count} seeds agree" if agree else "not clearly"
 
 
 def interval(values: Sequence[float]) -> Interval:
@@ -48,6 +67,19 @@ def interval(values: Sequence[float]) -> Interval:
         rng=np.random.default_rng(0),
     ).confidence_interval
     return Interval(mean, float(found.low), float(found.high), len(sample))
+
+
+def difference(values: Sequence[float]) -> Difference:
+    """The mean of paired differences [S], S >= 1, with its t interval; one value, or equal ones, have no width."""
+    from scipy.stats import t  # slow to import
+
+    sample = np.asarray(values, float)
+    mean, count = float(sample.mean()), len(sample)
+    half = 0.0
+    if count > 1 and np.ptp(sample) > 0:
+        half = float(t.ppf((1 + CONFIDENCE) / 2, count - 1) * sample.std(ddof=1) / np.sqrt(count))
+    agreeing = int((np.sign(sample) == np.sign(mean)).sum()) if mean else 0
+    return Difference(mean, mean - half, mean + half, count, agreeing)
 
 
 @dataclass(frozen=True)
@@ -76,7 +108,7 @@ class Times:
         return interval(self.restricted)
 
 
-def saved(one: Times, other: Times) -> Interval:
+def saved(one: Times, other: Times) -> Difference:
     """How many steps within the budget `one` needs less than `other`, seed by seed, both in the same order."""
     pairs = zip(one.restricted, other.restricted, strict=True)
-    return interval([theirs - ours for ours, theirs in pairs])
+    return difference([theirs - ours for ours, theirs in pairs])

@@ -1,19 +1,16 @@
-"""Sentences that say whether a conclusion of the paper holds, and why: all by rule, from the numbers."""
+"""Sentences that say whether a conclusion of the paper's tables holds, and why: all by rule, from the numbers."""
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from jmorl.paper.analysis import Finals, Mechanism, mechanism
+from jmorl.config import Config
 from jmorl.paper.data import PublishedTable
-from jmorl.paper.results import Curves, TargetRow, advantage, compared
-from jmorl.paper.statistics import Interval
+from jmorl.paper.mechanism import Mechanism, mechanism
+from jmorl.paper.naming import million, named, number, share
+from jmorl.paper.results import Pair, TargetRow, pair_of
+from jmorl.paper.statistics import Difference
 
-NAMES = {"interactive": "the interactive method", "pgmorl": "PGMORL"}
-
-
-def million(steps: float) -> str:
-    return f"{steps / 1e6:.2f} M"
+MISSING = "Not to be judged yet: runs are missing."
+METHODS = ("interactive", "pgmorl")  # those published
 
 
 def ahead(difference: float, resolution: float) -> str:
@@ -21,144 +18,108 @@ def ahead(difference: float, resolution: float) -> str:
     return "comparable" if abs(difference) < resolution else "interactive" if difference > 0 else "pgmorl"
 
 
-def target_verdict(published: PublishedTable, rows: Sequence[TargetRow], units: str) -> str:
-    """One target: who needs fewer steps in the paper, who does here, and what may explain a difference."""
-    interactive, pgmorl = (next((row for row in rows if row.method == name), None) for name in NAMES)
-    target = rows[0].target
-    theirs = published.mean_steps(target, "pgmorl") - published.mean_steps(target, "interactive")
-    before = ahead(theirs, 0.0)
-    difference = compared(interactive, pgmorl) if interactive and pgmorl else None
-    if difference is None or interactive is None or pgmorl is None:
+def published_order(published: PublishedTable, target: str) -> str:
+    """Which method needs fewer steps in the paper."""
+    return ahead(published.mean_steps(target, "pgmorl") - published.mean_steps(target, "interactive"), 0.0)
+
+
+def order(pair: Pair) -> str:
+    """Which method needs fewer steps here; half a generation cannot be told apart."""
+    config = Config.model_validate(pair.interactive.records[0].config)
+    return ahead(pair.difference.mean, config.population.iterations * config.steps_per_iteration / 2)
+
+
+def target_verdict(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
+    """One target: who needs fewer steps in the paper, and who does here."""
+    target, pair = rows[0].target, pair_of(rows)
+    if pair is None:
         return f"Target {target}: not to be compared yet, as runs of one method are missing."
-    now = ahead(difference.mean, _resolution(interactive))
-    agreement = "as in the paper" if now == before else f"whereas in the paper {NAMES[before]} is"
-    who = "neither method is ahead" if now == "comparable" else f"{NAMES[now]} is ahead"
-    successes = f"{interactive.times.successes} and {pgmorl.times.successes} of {len(interactive.seeds)} runs reach it"
-    published_successes = " and ".join(str(5 - published.row(target, name).timeouts) for name in NAMES)
-    sentences = [
-        f"Target {target}: {who}, {agreement}; the interactive method saves {_steps(difference)}, and "
-        f"{successes} (published: {published_successes} of 5).",
-        *(_against_published(published, row) for row in (interactive, pgmorl) if units == "paper" and now != before),
-        *(_drift(row) for row in (interactive, pgmorl) if units == "paper" and row.times.successes),
-        _shortfall(interactive, pgmorl, difference),
-    ]
-    return " ".join(filter(None, sentences))
-
-
-def _resolution(row: TargetRow) -> float:
-    """Half a generation: less cannot be told apart."""
-    steps = row.records[0].steps
-    return float(steps[1] - steps[0]) / 2 if len(steps) > 1 else float(steps[0]) / 2
-
-
-def _steps(difference: Interval) -> str:
-    sign = "" if difference.excludes_zero else ", too few or too scattered to be sure"
-    return f"{million(difference.mean)} steps [{million(difference.low)}, {million(difference.high)}]{sign}"
-
-
-def _drift(row: TargetRow) -> str:
-    """Whether successes in paper units are of policies or of units."""
-    if not row.drifted:
-        return f"None of {NAMES[row.method]}'s successes is owed to units that moved."
+    now, before = order(pair), published_order(published, target)
+    agreement = "as in the paper" if now == before else f"whereas in the paper {named(before)} is"
+    baseline = named(pair.baseline.method)
+    who = {"comparable": "neither method", "interactive": named("interactive"), "pgmorl": baseline}[now]
+    successes = " and ".join(share(row.times.successes, len(row.seeds)) for row in pair.rows)
+    theirs = " and ".join(str(published.row(target, method).successes) for method in METHODS)
     return (
-        f"{row.drifted} of {NAMES[row.method]}'s {_successes(row)} would not be one in the "
-        "units after the warm-up: sigma grew until the target was reached."
+        f"Target {target}: {who} is ahead, {agreement}; the interactive method saves {steps_saved(pair.difference)} "
+        f"against {baseline}{_better_of(pair)}, and {successes} runs reach it (published: {theirs} of 5)."
+        f"{_faults(pair)}"
     )
 
 
-def _successes(row: TargetRow) -> str:
-    return "1 success" if row.times.successes == 1 else f"{row.times.successes} successes"
-
-
-def _sentence(text: str) -> str:
-    return text[0].upper() + text[1:]
-
-
-def _against_published(published: PublishedTable, row: TargetRow) -> str:
-    """Where the order differs: which method needs other steps than published."""
-    difference = row.times.restricted_mean.mean - published.mean_steps(row.target, row.method)
-    return f"{_sentence(NAMES[row.method])} uses {million(abs(difference))} steps " + (
-        "more than published." if difference > 0 else "fewer than published."
-    )
-
-
-def _shortfall(interactive: TargetRow, pgmorl: TargetRow, difference: Interval) -> str:
-    """Where the interactive method falls short: what its search was doing in the runs that never arrived."""
-    late = difference.mean < 0 or interactive.times.successes < pgmorl.times.successes
-    if not late or interactive.times.successes == len(interactive.seeds):
+def _better_of(pair: Pair) -> str:
+    if not pair.others:
         return ""
-    runs = zip(interactive.records, interactive.found, strict=True)
-    found = mechanism([record for record, hit in runs if hit is None])
-    return f"In its runs that time out, {stuck(found)}."
+    others = " and ".join(
+        f"{named(row.method)}: {million(row.times.restricted_mean.mean)}, "
+        f"{share(row.times.successes, len(row.seeds))} reach it"
+        for row in pair.others
+    )
+    return f", the better of PGMORL's two rows (the other, {others})"
+
+
+def _faults(pair: Pair) -> str:
+    told = [f"{row.faults} of {named(row.method)}'s" for row in pair.rows if row.faults]
+    return f" Runs that broke down, {' and '.join(told)}, count as not reaching it unless they had before." * bool(told)
+
+
+def steps_saved(difference: Difference) -> str:
+    between = f"[{million(difference.low)}, {million(difference.high)}]"
+    return f"{million(difference.mean)} steps {between} ({difference.certainty})"
 
 
 def stuck(found: Mechanism) -> str:
     """What a search does, as a clause."""
-    return (
-        f"{found.candidates:.0f} policies lie within the bounds (median), {found.alone:.0%} of the generations have "
-        f"nothing but the choice itself to continue, {found.repeated:.0%} of the answers repeat the one before, and "
-        f"offspring gain {found.realised_gain:+.1%} of the front's range where {found.predicted_gain:+.1%} was "
+    parts = [
+        f"policies that can be continued number {number(found.candidates, '.0f', '0')} (median)",
+        f"{number(found.alone, '.0%', 'none')} of the generations have nothing but the choice itself to continue",
+        f"{number(found.repeated, '.0%', 'none')} of the answers repeat the one before",
+    ]
+    gains = (
+        f", and offspring gain {found.realised_gain:+.1%} of the front's range where {found.predicted_gain:+.1%} was "
         "predicted"
     )
+    return ", ".join(parts) + (gains if found.realised_gain == found.realised_gain else "")
+
+
+def shown(rows: Sequence[TargetRow]) -> str:
+    """The mechanism behind a row: of the runs that never arrived, or else of all."""
+    late = [record for row in rows for record in row.late]
+    which = "in its runs that never arrive" if late else "in its runs"
+    return f"{which}, {stuck(mechanism(late or [record for row in rows for record in row.records]))}"
 
 
 def table_verdict(published: PublishedTable, rows: Mapping[str, Sequence[TargetRow]]) -> str:
-    """A whole table: for how many targets the order of the methods is the published one."""
-    same, clear, total = 0, 0, 0
-    everything = [row for pair in rows.values() for row in pair]
-    for target, pair in rows.items():
-        if len(pair) == 2 and (difference := compared(*pair)):
-            theirs = published.mean_steps(target, "pgmorl") - published.mean_steps(target, "interactive")
-            total += 1
-            same += ahead(difference.mean, _resolution(pair[0])) == ahead(theirs, 0.0)
-            clear += difference.excludes_zero
-    if not total:
-        return "Not to be judged yet: runs are missing."
-    reach = " and ".join(
-        f"{NAMES[name]} in {sum(row.times.successes for row in everything if row.method == name)} of "
-        f"{sum(len(row.seeds) for row in everything if row.method == name)} runs"
-        for name in NAMES
-    )
-    verdict = "holds" if same == total else "does not hold" if same == 0 else "holds in part"
+    """A whole table: for how many targets the order of the methods is the published one, and clearly so."""
+    pairs = {target: pair for target, some in rows.items() if (pair := pair_of(some))}
+    if not pairs:
+        return MISSING
+    same = [name for name, pair in pairs.items() if order(pair) == published_order(published, name)]
+    clear = [name for name, pair in pairs.items() if pair.difference.clear and order(pair) != "comparable"]
+    sure, opposite = [n for n in same if n in clear], [n for n in clear if n not in same]
+    total = len(pairs)
+    verdict = "holds" if len(sure) == total else "does not hold" if not same else "holds in part"
+    reach = " and ".join(_reach(method, rows) for method in METHODS)
     return (
-        f"The paper's conclusion {verdict}: the methods are in the published order for {same} of {total} targets; "
-        f"for {clear} the difference between them clearly is not 0. "
+        f"The paper's conclusion {verdict}, because the methods are in the published order for {_of(same, total)}, "
+        f"clearly so for {_of(sure, total)}, and clearly in the other for {_of(opposite, total)}. "
         f"Targets are reached by {reach}."
     )
 
 
-def curve_verdict(claims: Mapping[str, str], rows: Sequence[Curves]) -> str:
-    """A figure of utilities: who ends higher for each user, beside what the text says."""
-    sentences = []
-    for user in dict.fromkeys(row.user for row in rows):
-        pair = [row for name in NAMES for row in rows if (row.user, row.method) == (user, name)]
-        difference = advantage(*pair) if len(pair) == 2 else None
-        if difference is None:
-            sentences.append(f"User {user}: not to be compared yet, as runs of one method are missing.")
-            continue
-        now = "comparable" if not difference.excludes_zero else ahead(difference.mean, 0.0)
-        who = "neither is clearly ahead" if now == "comparable" else f"{NAMES[now]} ends higher"
-        before = "both are comparable" if claims[user] == "comparable" else f"{NAMES[claims[user]]} ends higher"
-        agreement = "as the paper says" if now == claims[user] else f"the paper says that {before}"
-        sentences.append(
-            f"User {user}: {who} (difference {difference.mean:+.3g} [{difference.low:+.3g}, {difference.high:+.3g}]); "
-            f"{agreement}."
-        )
-    return " ".join(sentences)
+def _of(names: Sequence[str], total: int) -> str:
+    return f"{len(names)} of {total} targets" + (f" ({', '.join(names)})" if names else "")
 
 
-def finals_verdict(found: Mapping[str, Finals], weights: Mapping[str, Sequence[float]]) -> str:
-    """Final policies: whose utility is greater, and who dominates whom."""
-    sentences = []
-    for user, finals in found.items():
-        w = np.array(weights[user])
-        ours, theirs = finals.interactive @ w, float(finals.enautilus @ w)
-        better = int((ours > theirs).sum())
-        dominated = int((~finals.kept).sum())
-        fate = "not dominated" if finals.enautilus_kept else "dominated by one of them"
-        sentences.append(
-            f"User {user}: {better} of {len(ours)} interactive runs end on a greater utility than PGMORL with "
-            f"E-NAUTILUS on the pooled archives (mean {ours.mean():.4g}, best {ours.max():.4g}, against {theirs:.4g}); "
-            f"{dominated} of them are dominated, and E-NAUTILUS's policy is {fate}."
-        )
-    return " ".join(sentences) or "Not to be judged yet: runs are missing."
+def _reach(method: str, rows: Mapping[str, Sequence[TargetRow]]) -> str:
+    some = [row for each in rows.values() for row in each if row.method == method]
+    runs = sum(len(row.seeds) for row in some)
+    return f"{named(method)} in {share(sum(row.times.successes for row in some), runs)} runs"
+
+
+def against_published(published: PublishedTable, row: TargetRow) -> str:
+    """How many steps a method uses beside the published ones, as a clause."""
+    difference = row.times.restricted_mean.mean - published.mean_steps(row.target, row.method)
+    return f"it uses {million(abs(difference))} steps " + (
+        "more than published" if difference > 0 else "fewer than published"
+    )

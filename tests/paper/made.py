@@ -6,18 +6,31 @@ from jmorl.paper.record import GenerationRecord, PolicyRecord, QuestionRecord, R
 ITERATION = 24_000  # steps, at the paper's sizes on MountainCar
 
 
-def record(generations, sigma=None, chosen=0, questions=(), raw=None, candidates=3, env=CAR, parents=None, **config):
+def record(
+    generations,
+    sigma=None,
+    chosen=0,
+    questions=(),
+    raw=None,
+    discounted=None,
+    candidates=3,
+    env=CAR,
+    parents=None,
+    fault=None,
+    **config,
+):
     """A run whose generations are lists of new policies' values; all stay in archive and buffer that no other beats.
 
-    `sigma`: of each generation, in paper units. `raw`: every policy's returns by id, by default its values. `parents`:
-    id -> (parent, predicted values).
+    `sigma`: of each generation, in paper units. `raw`: every policy's returns by id, by default its values;
+    `discounted` likewise, by default not known. `parents`: id -> (parent, predicted values).
     """
     policies, made, known = [], [], []
     for number, born in enumerate(generations):
         for values in born:
             parent, predicted = (parents or {}).get(len(policies), (None, None))
             returns = raw[len(policies)] if raw else values
-            policies.append(PolicyRecord(number, parent, (0.5, 0.5), tuple(values), predicted, tuple(returns)))
+            worth = tuple(discounted[len(policies)]) if discounted else None
+            policies.append(PolicyRecord(number, parent, (0.5, 0.5), tuple(values), predicted, tuple(returns), worth))
         known = [index for index, policy in enumerate(policies) if not beaten(policy.values, policies)]
         made.append(
             GenerationRecord(
@@ -50,6 +63,7 @@ def record(generations, sigma=None, chosen=0, questions=(), raw=None, candidates
         generations=tuple(made),
         questions=asked,
         policies=tuple(policies),
+        fault=fault,
     )
 
 

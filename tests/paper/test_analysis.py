@@ -1,22 +1,22 @@
 """From records to results: by hand on made-up ones, and against real runs that stop or have other budgets."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from jmorl.paper.analysis import (
-    drift_of,
+    buffer_utility,
     finals,
     generations_within,
     greatest_utility,
-    mean_utility,
-    mechanism,
     non_dominated_or_equal,
+    offspring_utility,
     pooled_front,
-    questions_asked,
     reached,
-    seconds_between_questions,
-    steps_within,
+    seconds_within,
 )
+from jmorl.paper.mechanism import mechanism, waiting
 from jmorl.paper.record import record_of
 from jmorl.storage.stored_run import read_run
 from tests.paper.made import ITERATION, record
@@ -32,19 +32,28 @@ def test_a_target_is_reached_by_one_policy_in_every_objective():
     assert reached(run, (-90, -50)).generation == 0
 
 
-def test_whether_units_made_a_success():
-    run = record([[(-1.5, -1.5)], [(-0.9, -0.9)]], sigma=[(40, 20), (80, 20)])
-    np.testing.assert_array_equal(drift_of(run, 1), [2, 1])
-    assert not reached(run, (-1, -1)).without_drift  # (-1.8, -0.9) in the first units
-    assert reached(run, (-1.9, -1)).without_drift
-    assert reached(record([[(-1.0, -1.0)]]), (-1, -1)).without_drift
+def test_what_is_reached_after_the_cap_does_not_count():
+    run = record([[(-90, -50)], [(-70, -60)]])
+    assert reached(run, (-75, -65), cap=20 * ITERATION).generation == 1
+    assert reached(run, (-75, -65), cap=20 * ITERATION - 1) is None
 
 
-def test_utilities_are_of_archive_and_buffer():
+def test_utilities_are_of_archive_offspring_and_buffer():
     run = record([[(-90, -50), (-95, -55)], [(-70, -60)]])
     steps = 20 * ITERATION
     np.testing.assert_allclose(greatest_utility(run, (0.5, 0.5), steps), [-70, -65])
-    np.testing.assert_allclose(mean_utility(run, (0.5, 0.5), steps), [-72.5, (-70 - 75 - 65) / 3])
+    np.testing.assert_allclose(offspring_utility(run, (0.5, 0.5), steps), [-72.5, -65])
+    np.testing.assert_allclose(buffer_utility(run, (0.5, 0.5), steps), [-72.5, (-70 - 75 - 65) / 3])
+
+
+def test_bounds_and_untrained_policies_do_not_touch_the_mean_of_the_offspring():
+    run = record([[(4.0, -18.0)] * 6 + [(1.0, -1.0)] * 6, [(2.0, -2.0)] * 6], sigma=[(1, 1)] * 2)
+    bounded = replace(run.generations[1], bounds=(1.5, -5.0), buffer=(12,))
+    bounded = replace(run, generations=(run.generations[0], bounded))
+    for each in (run, bounded):
+        np.testing.assert_allclose(offspring_utility(each, (0.5, 0.5), 20 * ITERATION), [0, 0])
+    nobody = replace(bounded, generations=(run.generations[0], replace(bounded.generations[1], bounds=(9.0, 9.0))))
+    assert np.isnan(buffer_utility(nobody, (0.5, 0.5), 20 * ITERATION, bounded=True)[1])
 
 
 def test_final_policies_are_filtered_together():
@@ -66,7 +75,7 @@ def test_equal_policies_do_not_dominate_each_other():
 
 def test_the_mechanism_counts_repeats_and_gains():
     run = record(
-        [[(0.0, 0.0), (10.0, -10.0)], [(5.0, 0.0)]],
+        [[(0.0, 0.0), (10.0, -10.0)], [(5.0, 0.0)], [(5.0, 0.0)]],
         parents={2: (0, (2.0, 2.0))},
         questions=[(1, 0), (2, 0), (3, 2)],
         candidates=1,
@@ -77,7 +86,15 @@ def test_the_mechanism_counts_repeats_and_gains():
     span = np.ptp(front, axis=0)
     assert found.predicted_gain == pytest.approx(np.mean(2 / span))
     assert found.realised_gain == pytest.approx(np.mean([5, 0] / span))
-    assert questions_asked([run]) == 3 and seconds_between_questions([run]) == 4.0
+    asked = waiting([run])
+    assert (asked.questions, asked.before_first, asked.between) == (3, 4.0, 4.0)
+    assert seconds_within(run, 20 * ITERATION) == 8.0
+
+
+def test_who_is_asked_at_the_end_waits_for_the_whole_run():
+    run = record([[(-90, -50)], [(-70, -60)], [(-70, -50)]], questions=[(3, 2)])
+    asked = waiting([run])
+    assert (asked.questions, asked.before_first) == (1, 12.0) and np.isnan(asked.between)
 
 
 @pytest.fixture(scope="module")
@@ -107,12 +124,12 @@ def test_the_long_run_says_when_a_run_that_stops_would_have_stopped(pgmorl):
 
 def test_with_a_constant_learning_rate_a_run_is_the_beginning_of_a_longer_one(pgmorl, small_config):
     whole = pgmorl("longer")
-    assert steps_within(small_config, small_config.steps) == whole.steps[-1]
+    assert generations_within(whole, small_config.steps) == len(whole.steps)
     for iterations in (3, 5, 6, 8):
         steps = 4 * 3 * 16 * iterations
         short = pgmorl(f"short-{iterations}", steps=steps)
         count = generations_within(whole, steps)
-        assert steps_within(small_config, steps) == short.steps[-1]
+        assert whole.steps[count - 1] == short.steps[-1]
         assert [each.front for each in whole.generations[:count]] == [each.front for each in short.generations]
         np.testing.assert_array_equal(whole.values[: len(short.values)], short.values)
         np.testing.assert_array_equal(pooled_front([whole], steps), pooled_front([short], steps))

@@ -7,6 +7,7 @@ import pytest
 
 from jmorl.config import resolve
 from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.learning.population import Population, TrainingFault
 from jmorl.paper import Method, compare
 from tests.registered import ThreeWays
 
@@ -48,6 +49,26 @@ def test_the_tables_are_of_all_methods_targets_and_seeds(methods, tmp_path):
     assert Stubborn.asked == 2 * (1 + 4)  # near: the final choice only; beyond: three questions and the final choice
     again = compare(ThreeWays.id, methods, TARGETS, seeds=(1, 2), out=tmp_path)
     assert again.markdown() == text and Stubborn.asked == 10
+
+
+def test_unequal_budgets_are_refused(methods, tmp_path):
+    other = Method(methods["pgmorl"].config.replace(steps=4 * 3 * 16 * 8))
+    with pytest.raises(ValueError, match=r"within one budget of steps; theirs are: stubborn 2112, shorter 1536"):
+        compare(ThreeWays.id, {"stubborn": methods["stubborn"], "shorter": other}, TARGETS, (1,), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_breaks_down_counts_as_not_reaching_its_target(methods, tmp_path, monkeypatch):
+    def broken(*_):
+        raise TrainingFault("agent 0: loss is not finite in iteration 1")
+
+    monkeypatch.setattr(Population, "train", broken)
+    found = compare(ThreeWays.id, {"pgmorl": methods["pgmorl"]}, {"near": TARGETS["near"]}, (1, 2), tmp_path)
+    (row,) = found.rows
+    assert row.times.reached == (None, None) and row.faults == 2
+    text = found.markdown()
+    assert "| near | pgmorl | 0.00 [0.00, 0.00] | 0 of 2 |" in text and "≥ 0.00 (broke down at 0.00 M)" in text
+    assert "nan" not in text
 
 
 def test_the_readmes_example_works(small_config, tmp_path, monkeypatch, capsys):

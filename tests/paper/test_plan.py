@@ -3,12 +3,16 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from jmorl.arguments import PAPER_ITEMS
+from jmorl.paper.claims import CURVE_STATEMENTS, FINALS_STATEMENTS
 from jmorl.paper.data import honest, published
-from jmorl.paper.plan import CAR, CHEETAH, ITEMS, PILOT_SEEDS, TARGET_SEEDS, UNITS, USER_SEEDS, Plan, distinct
+from jmorl.paper.plan import CAR, CHEETAH, ITEMS, PILOT_SEEDS, SHORTER, TARGET_SEEDS, USER_SEEDS, Plan, distinct
+from jmorl.paper.runner import Places, missing
 
+UNITS = ("raw", "paper")
 FULL, QUICK = Plan(), Plan(quick=True)
 EVERYTHING = [(item, units) for item in ITEMS.values() for units in UNITS]
 
@@ -65,6 +69,7 @@ def test_in_paper_units_the_settings_are_the_authors(name, gamma_n, rollout, bud
     assert (config.population.agents, config.ppo.environments, config.ppo.rollout_steps) == (6, 4, rollout)
     assert (config.ppo.discount, config.evaluation.scale_discount, config.evaluation.episodes) == (0.995, gamma_n, 5)
     assert (config.evaluation.units, config.evaluation.actions, config.steps) == ("paper", "sampled", budget)
+    assert (config.ppo.weights_on, config.search.buffer_size) == ("scaled", 2)
     assert (config.search.bounds_scale, config.search.gain_within, config.search.value_scale) == (
         "one",
         "front",
@@ -79,6 +84,32 @@ def test_in_raw_units_the_settings_are_this_programs_own():
     config = FULL.cells(ITEMS["fig5"], "raw")[0].config
     own = resolve(overrides={"env": CAR, "user": "A", "seed": 1})
     assert config == own.replace(checkpoints={"keep": 2}, steps=2_500_000)
+    assert (config.ppo.weights_on, config.search.buffer_size) == ("raw", 4)
+
+
+def test_the_committed_records_are_of_the_plans_cells():
+    """Digests of raw cells stay what they were, so that no finished run is made again."""
+    places = Places(Path("benchmarks/paper/records"), Path("nowhere"))
+    cells = distinct(
+        cell for name in ("table1", "fig5", "fig6", "fig9", "fig10") for cell in FULL.cells(ITEMS[name], "raw")
+    )
+    assert len(cells) == 41 and missing(cells, places) == []
+
+
+def test_pgmorl_has_a_second_row_with_the_papers_warm_up_on_halfcheetah_made_last():
+    for name, seeds in (("table2", QUICK.seeds_of(ITEMS["table2"])), ("fig7", USER_SEEDS), ("fig8", USER_SEEDS)):
+        plan = QUICK if name == "table2" else FULL  # its targets may not be fixed yet
+        cells = plan.cells(ITEMS[name], "raw")
+        later = [cell for cell in cells if cell.later]
+        assert cells[-len(later) :] == later and [cell.config.seed for cell in later] == list(seeds)
+        assert all(cell.config.method == "pgmorl" and SHORTER in cell.key for cell in later)
+    shorter = FULL.pgmorl(ITEMS["fig7"], "raw", 1, SHORTER).config
+    assert shorter.population.warmup_iterations == 40
+    own = FULL.pgmorl(ITEMS["fig7"], "raw", 1).config
+    assert own.population.warmup_iterations == 120 and shorter == own.replace(population={"warmup_iterations": 40})
+    others = [("fig5", "raw"), ("fig7", "paper"), ("fig11", "raw")]
+    assert not any(cell.later for name, units in others for cell in FULL.cells(ITEMS[name], units))
+    assert not any(cell.later for cell in FULL.pilots(CHEETAH))
 
 
 def test_seeds_are_the_papers_and_pilots_have_others():
@@ -101,7 +132,7 @@ def test_the_raw_targets_are_five_per_cent_from_the_exact_front():
 def test_a_table_without_targets_has_no_runs_and_says_so():
     if honest(CHEETAH).targets is None:
         assert FULL.cells(ITEMS["table2"], "raw") == []
-    assert len(QUICK.cells(ITEMS["table2"], "raw")) == 8
+    assert len(QUICK.cells(ITEMS["table2"], "raw")) == 10
 
 
 def test_the_published_numbers_are_complete_and_fit_each_other():
@@ -115,6 +146,28 @@ def test_the_published_numbers_are_complete_and_fit_each_other():
             assert (row.mean_steps is None) == (succeeded == 0)
     assert tables["table1"].mean_steps("B", "pgmorl") == 5_000_000
     assert set(published().claims) == set(ITEMS) - set(tables)
+
+
+def test_every_statement_of_a_figures_text_has_a_rule():
+    for name, claims in published().claims.items():
+        finals = ITEMS[name].kind == "final policies"
+        assert set(claims.also) <= set(FINALS_STATEMENTS if finals else CURVE_STATEMENTS)
+        assert set(claims.ahead) == (set() if finals else {"A", "B", "C"})
+
+
+def test_deviations_of_rows_with_four_time_outs_follow_from_their_means():
+    table = published().tables["table2"]
+    rows = [row for row in table.rows if row.timeouts == 4]
+    assert [(row.target, row.method) for row in rows] == [("B", "interactive"), ("C", "pgmorl")]
+    for row in rows:
+        runs = [table.cap_steps] * 4 + [5 * row.mean_steps - 4 * table.cap_steps]
+        assert np.std(runs, ddof=1) == pytest.approx(row.std_steps, rel=1e-3)
+        assert row.std_printed != pytest.approx(row.std_steps, rel=0.1)
+
+
+def test_the_papers_time_is_that_of_all_its_runs():
+    hours = [table.seconds / 3600 for table in published().tables.values()]
+    assert hours == pytest.approx([10.2, 25.7], abs=0.05)
 
 
 def test_the_command_line_knows_every_item():

@@ -1,12 +1,21 @@
 """What is kept of a run: all of it comes back, and who was where in each generation is as the run had it."""
 
+import json
 import shutil
 
 import numpy as np
 import pytest
 
 import envs
-from jmorl.paper.record import RecordError, is_record_of, memberships, read_record, record_of, write_record
+from jmorl.paper.record import (
+    RecordError,
+    broken_record,
+    is_record_of,
+    memberships,
+    read_record,
+    record_of,
+    write_record,
+)
 from jmorl.run import GenerationFinished
 from jmorl.storage.continuing import Continued
 from jmorl.storage.run_folder import RunFolder
@@ -61,6 +70,9 @@ def test_a_record_says_what_the_run_did(run):
     units = generations[-1].state.units
     expected = [None] * 3 if units is None else pytest.approx(units.deviation.tolist(), rel=1e-6)
     assert list(record.generations[-1].sigma) == expected
+    assert record.fault is None and record.in_paper_units == (units is not None)
+    for policy, kept in zip(policies, record.policies, strict=True):
+        assert kept.discounted == (None if units is None else pytest.approx(policy.discounted.tolist(), rel=1e-6))
 
 
 def test_a_record_comes_back_from_its_file(run, tmp_path):
@@ -86,6 +98,33 @@ def test_what_is_no_record_is_named(run, tmp_path):
     file.write_text(text.replace('"format": 1', '"format": 2'))
     with pytest.raises(RecordError, match="format 2, not 1"):
         read_record(file)
+
+
+def test_a_record_from_before_later_fields_is_read(run, tmp_path):
+    path, _, _ = run
+    file = tmp_path / "record.json"
+    write_record(file, record_of(read_run(path)))
+    fields = json.loads(file.read_text())
+    del fields["fault"]
+    for policy in fields["policies"]:
+        del policy["discounted"]
+    file.write_text(json.dumps(fields))
+    record = read_record(file)
+    assert record.fault is None and {policy.discounted for policy in record.policies} == {None}
+
+
+def test_what_a_run_had_when_it_broke_down_is_kept(run, tmp_path):
+    path, config, generations = run
+    copy = shutil.copytree(path, tmp_path / "copy")
+    (copy / "result.json").unlink()
+    record = broken_record(copy, config, "agent 1: loss is not finite")
+    assert (record.reason, record.chosen, record.fault) == ("broke down", None, "agent 1: loss is not finite")
+    assert record.total_steps == generations[-1].steps and record.digest == config.digest()
+    (copy / "metrics.csv").unlink()
+    nothing = broken_record(copy, config, "agent 1: loss is not finite")
+    assert (nothing.total_steps, nothing.total_seconds, nothing.objectives) == (0, 0.0, record.objectives)
+    write_record(tmp_path / "record.json", nothing)
+    assert read_record(tmp_path / "record.json") == nothing
 
 
 def test_an_unfinished_run_has_no_record(run, tmp_path):

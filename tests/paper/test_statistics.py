@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jmorl.paper.statistics import Times, interval, saved
+from jmorl.paper.statistics import Times, difference, interval, saved
 
 STEPS = st.one_of(st.none(), st.integers(1, 40).map(lambda g: g * 0.24))
 
@@ -58,6 +58,24 @@ def test_the_interval_of_the_same_values_is_always_the_same():
 def test_what_is_saved_is_paired_and_counts_time_outs_at_the_budget():
     found = saved(Times((1.0, None), 10.0), Times((4.0, 9.0), 10.0))
     assert found.mean == pytest.approx((3.0 - 1.0) / 2)
-    assert not found.excludes_zero
-    assert not saved(Times((1.0, 2.0), 10.0), Times((None, None), 10.0)).excludes_zero  # two say little
-    assert saved(Times((1.0, 2.0, 1.0), 10.0), Times((None, None, 9.0), 10.0)).excludes_zero
+    assert not found.clear
+    assert not saved(Times((1.0, 2.0), 10.0), Times((None, None), 10.0)).clear  # two say little
+    assert saved(Times((1.0, 2.0, 1.0), 10.0), Times((None, None, 9.0), 10.0)).clear
+
+
+def test_a_paired_difference_has_a_t_interval_wider_than_the_bootstraps():
+    values = [1.0, 3.0, 2.0]
+    found = difference(values)
+    assert (found.mean, found.count, found.agreeing) == (2.0, 3, 3)
+    assert found.high - found.mean == pytest.approx(4.302653 / np.sqrt(3), rel=1e-5)
+    assert found.low < interval(values).low and not found.clear
+    assert found.certainty == "not clearly, though all 3 seeds agree"
+    assert difference([1.0, -3.0, 2.5]).certainty == "not clearly"
+    assert difference([2.0, 2.1, 2.2]).certainty == "clearly"
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_the_t_interval_covers_the_mean_as_often_as_it_says(count):
+    random = np.random.default_rng(1)
+    covered = [d.low <= 0 <= d.high for d in (difference(random.normal(size=count)) for _ in range(2000))]
+    assert np.mean(covered) == pytest.approx(0.95, abs=0.015)

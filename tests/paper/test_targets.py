@@ -1,4 +1,4 @@
-"""Targets are proposed by a rule: the best of the pooled front, relaxed until half of the pilot runs reach it."""
+"""Targets are proposed by a rule: the best of the pooled front, relaxed until half of each method's runs reach it."""
 
 import numpy as np
 
@@ -6,27 +6,52 @@ from jmorl.paper.plan import CAR
 from jmorl.paper.targets import proposals, propose
 from tests.paper.made import ITERATION, record
 
-STEPS = 10 * ITERATION
+STEPS = 20 * ITERATION
+START = [(-300.0, -90.0)]  # nobody's target
 
 
-def test_a_target_is_the_best_policy_relaxed_until_half_of_the_runs_reach_it():
-    good = [record([[(-100.0, -20.0), (-70.0, -60.0), (-78.0, -30.0)]]) for _ in range(2)]
-    slower = [record([[(-100.0, -20.0), (-70.0, -60.0), (-82.0, -33.0)]]) for _ in range(3)]
-    found = {each.user: each for each in proposals(good + slower, STEPS)}
-    balanced = found["A"]
+def pilot(front, method, user="A", start=START, **config):
+    return record([start, front], method=method, user=user, **config)
+
+
+GOOD, SLOWER = [(-100.0, -20.0), (-70.0, -60.0), (-78.0, -30.0)], [(-100.0, -20.0), (-70.0, -60.0), (-82.0, -33.0)]
+
+
+def test_a_target_is_the_best_policy_relaxed_until_half_of_each_methods_runs_reach_it():
+    runs = [pilot(GOOD, "interactive") for _ in range(3)]
+    runs += [pilot(front, "pgmorl") for front in (GOOD, SLOWER, SLOWER)]
+    (balanced,) = proposals(runs, STEPS)
     assert balanced.best.tolist() == [-78, -30]
-    # 2 of 5 runs reach it as it is; the others are (4, 3) short, of ranges (30, 40): relaxed by 15 %.
-    assert abs(balanced.relaxed - 0.15) < 1e-9 and balanced.reached == 5
+    # 4 of 6 runs reach it as it is, but 1 of PGMORL's 3; the others are (4, 3) short, of ranges (30, 40): 15 %.
+    assert abs(balanced.relaxed - 0.15) < 1e-9
+    assert (balanced.reached, balanced.runs) == ({"interactive": 3, "pgmorl": 3}, 3)
     np.testing.assert_allclose(balanced.target, (-82.5, -36.0))
 
 
-def test_what_half_of_the_runs_have_is_not_relaxed():
-    found = proposals([record([[(-78.0, -30.0), (-60.0, -60.0)]]), record([[(-90.0, -70.0)]])], STEPS)
-    assert all(each.relaxed == 0 and each.reached == 1 for each in found)
+def test_what_half_of_each_methods_runs_have_is_not_relaxed():
+    runs = [pilot(front, method) for method in ("interactive", "pgmorl") for front in (GOOD, SLOWER)]
+    (found,) = proposals(runs, STEPS)
+    assert found.relaxed == 0 and found.reached == {"interactive": 1, "pgmorl": 1}
+
+
+def test_as_many_runs_of_each_method_are_pooled_and_only_those_of_the_user():
+    better = [(-60.0, -10.0)]
+    runs = [pilot(GOOD, "interactive"), pilot(better, "interactive"), pilot(better, "interactive", user="B")]
+    runs.append(pilot(SLOWER, "pgmorl"))
+    for_a, for_b = proposals(runs, STEPS)
+    assert (for_a.runs, for_b.runs) == (1, 1)
+    assert for_a.best.tolist() == [-78, -30] and tuple(for_b.best) == better[0]
+
+
+def test_a_target_that_the_warm_up_reaches_is_marked():
+    runs = [pilot(GOOD, "interactive"), pilot(GOOD, "pgmorl", start=GOOD)]
+    (found,) = proposals(runs, STEPS)
+    assert found.at_once == 1 and "NOT USABLE: 1 reach it with the warm-up alone" in str(found)
 
 
 def test_the_proposal_says_what_it_rests_on():
-    runs = {"one": record([[(-78.0, -30.0)]], seed=2), "two": record([[(-78.0, -31.0)]], seed=3)}
+    runs = {"one": pilot([(-78.0, -30.0)], "interactive", seed=2), "two": pilot([(-78.0, -31.0)], "pgmorl", seed=3)}
     text = propose(CAR, runs)
-    assert "from 2 runs with seeds [2, 3]" in text and '"A": [-78, -30]' in text
+    assert "from 2 runs with seeds [2, 3]" in text and "1 of 1 interactive runs and 1 of 1 pgmorl runs reach it" in text
     assert propose(CAR, {}) == f"{CAR}: no pilot runs yet"
+    assert "runs of one of the methods are missing" in propose(CAR, {"one": runs["one"]})

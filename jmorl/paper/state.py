@@ -1,0 +1,103 @@
+"""What a report rests on: runs, time, commits, and what is missing or broke down."""
+
+from collections.abc import Iterator, Sequence
+
+from jmorl.display.text import duration, short_count
+from jmorl.paper import markdown
+from jmorl.paper.data import published
+from jmorl.paper.plan import ITEMS, NAMES, Cell, Item, Plan, distinct, in_order
+from jmorl.paper.record import RunRecord
+from jmorl.paper.results import Records
+
+Wanted = Sequence[tuple[Item, str, Sequence[Cell]]]
+NO_COMMIT = "no commit"
+
+
+def state(plan: Plan, items: Sequence[Item], units: Sequence[str], records: Records) -> str:
+    """As Markdown."""
+    wanted = [(item, each, plan.cells(item, each)) for item, each in in_order(items, units)]
+    there = [records[cell.key] for cell in _distinct(wanted) if cell.key in records]
+    devices = ", ".join(sorted({run.device for run in there}))
+    total = markdown.totals(_steps(there), _seconds(there), len(there))
+    parts = [
+        f"It rests on {total}" + (f" on {devices}." if devices else "."),
+        _commits(there),
+        markdown.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)),
+        _beside_the_papers(wanted, records),
+        "\n".join([*_missing(wanted, records), *_broken(wanted, records)]),
+    ]
+    return "\n\n".join(filter(None, parts))
+
+
+def _distinct(wanted: Wanted) -> list[Cell]:
+    return distinct(cell for _, _, some in wanted for cell in some)
+
+
+def _steps(runs: Sequence[RunRecord]) -> int:
+    return sum(run.total_steps for run in runs)
+
+
+def _seconds(runs: Sequence[RunRecord]) -> float:
+    return sum(run.total_seconds for run in runs)
+
+
+def _commits(runs: Sequence[RunRecord]) -> str:
+    """Of which code the records are."""
+    known = [(run.commit or NO_COMMIT)[:12] for run in runs]
+    counts = {commit: known.count(commit) for commit in sorted(set(known))}
+    if not counts:
+        return ""
+    told = ", ".join(f"{commit} ({count} runs)" for commit, count in counts.items())
+    mixed = " They are of several commits, between which the code may have changed." if len(counts) > 1 else ""
+    return f"Commits of the records: {told}.{mixed}"
+
+
+def _parts(wanted: Wanted, records: Records) -> Iterator[list[str]]:
+    """What each part took. A run that several need counts for the first of them, and what is left may be nothing."""
+    counted: set[str] = set()
+    for item, units, cells in wanted:
+        there = [records[cell.key] for cell in cells if cell.key in records and cell.key not in counted]
+        counted |= {cell.key for cell in cells}
+        yield [item.name, units, str(len(there)), short_count(_steps(there)), duration(_seconds(there))]
+
+
+def _beside_the_papers(wanted: Wanted, records: Records) -> str:
+    """The time of each environment's runs, and of its table's beside the published."""
+    lines = []
+    for env, units in dict.fromkeys((item.env, units) for item, units, _ in wanted):
+        every = distinct(c for item, each, some in wanted if (item.env, each) == (env, units) for c in some)
+        table = next(item for item in ITEMS.values() if (item.env, item.kind) == (env, "steps to targets"))
+        cells = [cell for item, each, some in wanted if (item, each) == (table, units) for cell in some]
+        theirs = published().tables[table.name].seconds
+        times = [_seconds([records[cell.key] for cell in some if cell.key in records]) for some in (every, cells)]
+        lines.append([NAMES[env], units, *map(duration, times), duration(theirs)])
+    text = (
+        "All runs of an environment, those of its table, and the paper's time for that table: the time per run of each "
+        "row times its five runs. One run of PGMORL serves all targets here."
+    )
+    return f"{text}\n\n{markdown.table(['environment', 'units', 'all runs', 'table', 'table in the paper'], lines)}"
+
+
+def _missing(wanted: Wanted, records: Records) -> Iterator[str]:
+    for item, units, some in wanted:
+        absent = [cell.key for cell in some if cell.key not in records]
+        if absent:
+            yield f"- Missing: {item.name} in {units} units, {len(absent)} of {len(some)} runs: {_named(absent)}."
+        if not some:
+            yield f"- Missing: {item.name} in {units} units, whose targets are not fixed yet."
+
+
+def _named(keys: Sequence[str]) -> str:
+    """Keys of cells, seeds of the same kind together."""
+    seeds: dict[str, list[str]] = {}
+    for key in keys:
+        kind, _, seed = key.rpartition("-seed-")
+        seeds.setdefault(kind, []).append(seed)
+    return "; ".join(f"{kind}, seed{'s' * (len(some) > 1)} {', '.join(some)}" for kind, some in seeds.items())
+
+
+def _broken(wanted: Wanted, records: Records) -> Iterator[str]:
+    for cell in _distinct(wanted):
+        record = records.get(cell.key)
+        if record and record.fault:
+            yield f"- Broke down: {cell.key} after {short_count(record.total_steps)} steps: {record.fault}."
