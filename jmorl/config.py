@@ -66,7 +66,7 @@ class PopulationConfig(Section):
 
 
 class PPOConfig(Section):
-    """Multi-objective PPO (design: algorithm, section 3)."""
+    """Multi-objective PPO: how an agent learns from its rollouts."""
 
     environments: Count = Field(4, description="E, environments of each agent")
     rollout_steps: Count = Field(1000, description="T, steps of each environment in an iteration")
@@ -124,7 +124,7 @@ class EvaluationConfig(Section):
 
 
 class SearchConfig(Section):
-    """Which policy is trained next, with which weights (design: algorithm, sections 6 to 8)."""
+    """Which policy is trained next, and with which weights."""
 
     delta: NonNegative = Field(0.1, description="slack of the bounds, z - delta sqrt(s |z|)")
     bounds_scale: Literal["range", "one"] = Field(
