@@ -1,7 +1,6 @@
-"""Registers probe environments, for processes that know them only by `--env tests.registered:probe-three-ways`."""
+"""Registers a probe environment, for processes that know it only by `--env tests.registered:probe-three-ways`."""
 
 import envs
-from tests.probes import FaultyLater, ThreeWays
+from tests.probes import ThreeWays
 
 envs.register(ThreeWays.id, ThreeWays)
-envs.register(FaultyLater.id, FaultyLater)

@@ -289,7 +289,7 @@ def test_numbers_that_stop_being_finite_end_the_run_and_reach_no_file(tmp_path, 
         *("--ppo.environments", "2", "--ppo.rollout-steps", "4", "--ppo.minibatches", "1", "--ppo.epochs", "1"),
         *("--ppo.hidden-sizes", "8", "--evaluation.episodes", "2", "--steps", "64"),
     ]
-    arguments = ["train", "--env", "tests.registered:probe-faulty-later", *sizes, "--json", "--out", str(folder)]
+    arguments = ["train", "--env", "tests.registered_faulty:probe-faulty-later", *sizes, "--json", "--out", str(folder)]
     assert main(arguments) == 1
     printed = capsys.readouterr()
     # The seventh step of an episode falls into the second rollout of four steps.
