@@ -111,9 +111,9 @@ def drift_told(row: TargetRow) -> str:
     """Whether successes in paper units are of policies or of units."""
     of = "1 success" if row.times.successes == 1 else f"{row.times.successes} successes"
     if not row.drifted:
-        return f"None of {named(row.method)}'s {of} is owed to moving units."
+        return f"Target {row.target}: none of {named(row.method)}'s {of} is owed to moving units."
     start = f", {row.untrained} of them of policies never trained" if row.untrained else ""
     return (
-        f"{row.drifted} of {named(row.method)}'s {of} are owed to moving units{start}: no trained policy found by then "
-        "would do in the units after the warm-up."
+        f"Target {row.target}: {row.drifted} of {named(row.method)}'s {of} are owed to moving units{start}: no trained "
+        "policy found by then would do in the units after the warm-up."
     )

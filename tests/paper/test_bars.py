@@ -56,7 +56,7 @@ def test_successes_at_the_start_and_without_drift_point_to_what_is_not_copied():
     assert "An uncopied defect: 3 of the successes come with generation 0" in start
     (line,) = explanations(TABLE, [interactive, row("pgmorl", (2, 3, 4), sigma=still)])
     assert "An uncopied defect, by elimination" in line
-    assert drift_told(interactive) == "None of the interactive method's 3 successes is owed to moving units."
+    assert drift_told(interactive) == "Target B: none of the interactive method's 3 successes is owed to moving units."
 
 
 def test_fewer_successes_are_our_own_shortfall_unless_units_hide_them():
