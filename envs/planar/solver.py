@@ -132,11 +132,9 @@ def _root_motion(model: PlanarModel, whole: jax.Array, joints: Joints) -> jax.Ar
 
 
 class Solution(NamedTuple):
-    """Constrained accelerations, and the residuals of all rows there."""
+    """Constrained accelerations."""
 
     qacc: jax.Array  # [V, batch]
-    contact_residuals: jax.Array  # [3, 2 ends, slots, batch]
-    limit_residuals: jax.Array  # [V - 2, batch]
     steps: jax.Array  # [] of Newton, until no active set changed in the whole batch
 
 
@@ -192,7 +190,7 @@ def constrained(
     still = point(jnp.zeros_like(joints.force), jnp.zeros_like(bodies[:3]))
     begin = _any(jnp.ones_like(still.qacc, bool))  # true, and each device's own where the batch is spread over several
     count, _, found = jax.lax.while_loop(unsettled, step, (jnp.array(0), begin, still))
-    return Solution(found.qacc, found.contact, found.limit, count)
+    return Solution(found.qacc, count)
 
 
 def _share(
