@@ -1,9 +1,9 @@
 """Proposing targets in raw units from pilot runs, on other seeds than the experiment's.
 
-A rule and no taste: for each user, the policy of greatest utility on the pooled front of as many runs of the
-interactive method for that user as of PGMORL, in units of that front's range; then relaxed in all objectives alike, in
-steps of 2.5 % of the range, until at least half of each method's runs reach it. Such a target is within reach of either
-method. Whether it is reached by the warm-up alone, and so measures nothing, is said with it.
+A rule and no taste: for each user, the policy of greatest utility on the pooled front of all runs of both methods, in
+units of that front's range; then relaxed in all objectives alike, in steps of 2.5 % of the range, until it is reached
+by at least half of each method's runs: the interactive ones for that user, and as many of PGMORL. Such a target is
+within reach of either method. Whether it is reached by the warm-up alone, and so measures nothing, is said with it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,13 +45,14 @@ class Proposal:
 
 def proposals(records: Sequence[RunRecord], steps: int) -> list[Proposal]:
     """One for each of the paper's users that has a run of either method."""
-    by_user = {user: _of(records, user) for user in USERS}
-    return [_proposal(user, runs, steps) for user, runs in by_user.items() if all(runs.values())]
-
-
-def _of(records: Sequence[RunRecord], user: str) -> Runs:
-    """Equally many runs of each method: those of this user, and of PGMORL, which has no user."""
     whole = [record for record in records if record.fault is None]
+    front = pooled_front(whole, steps)
+    by_user = {user: _of(whole, user) for user in USERS}
+    return [_proposal(user, runs, front, steps) for user, runs in by_user.items() if all(runs.values())]
+
+
+def _of(whole: Sequence[RunRecord], user: str) -> Runs:
+    """Equally many runs of each method: those of this user, and of PGMORL, which has no user."""
     runs = {
         method: [r for r in whole if r.config["method"] == method and (method == "pgmorl" or r.config["user"] == user)]
         for method in METHODS
@@ -60,9 +61,8 @@ def _of(records: Sequence[RunRecord], user: str) -> Runs:
     return {method: some[:fewest] for method, some in runs.items()}
 
 
-def _proposal(user: str, runs: Runs, steps: int) -> Proposal:
+def _proposal(user: str, runs: Runs, front: np.ndarray, steps: int) -> Proposal:
     pooled = [record for some in runs.values() for record in some]
-    front = pooled_front(pooled, steps)
     extent = np.ptp(front, axis=0)
     span = np.where(extent > 0, extent, np.maximum(np.abs(front[0]), 1.0))
     best = front[np.argmax((front / span) @ np.array(USERS[user]))]
