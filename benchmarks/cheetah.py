@@ -63,7 +63,7 @@ def _record(config: Config) -> RunRecord:
         cell, places = paper, PAPER
     else:
         cell, places = Cell(config.digest(), config), VARIANTS
-    return make(cell, places, lambda *_: None) if missing([cell], places) else read_record(places.record(cell))
+    return make([cell], places, lambda *_: None)[0] if missing([cell], places) else read_record(places.record(cell))
 
 
 def _judged(record: RunRecord) -> dict[str, Any]:

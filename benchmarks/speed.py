@@ -30,7 +30,7 @@ import envs
 from jmorl.config import resolve
 from jmorl.learning.devices import usable_cores, use_all_cpu_cores
 from jmorl.learning.population import Population
-from jmorl.run import Compiled, GenerationFinished, evaluation_keys, run
+from jmorl.run import Compiled, GenerationFinished, run
 from jmorl.search.prediction import Records, predict
 from jmorl.search.selection import select_tasks
 from jmorl.search.weights import simplex_grid, spread_weights
@@ -178,7 +178,7 @@ def _training(env: str, agents: int, environments: int) -> Callable[[], Any]:
         population={"agents": agents}, ppo={"environments": environments}, steps=10**9
     )
     population = Population(envs.make(config.env), config)
-    population.compile(evaluation_keys(config))
+    population.compile()
     learners = population.initialize(jax.random.key(0))
     weights = spread_weights(2, agents)
     return lambda: population.train(learners, weights, jax.random.key(1), SCALED_ITERATIONS, config.ppo.learning_rate)

@@ -95,6 +95,13 @@ def _add_paper(commands: Any) -> None:
     paper.add_argument("--units", choices=["raw", "paper", "both"], default="both", help="default: both")
     paper.add_argument("--seeds", type=_seeds, metavar="SEED,...", help="default: the paper's")
     paper.add_argument("--quick", action="store_true", help="all of it at a tiny size, to see that it works")
+    paper.add_argument(
+        "--together",
+        type=_count,
+        default=1,
+        metavar="RUNS",
+        help="made in one program, where one alone does not fill the machine (default: 1)",
+    )
     paper.add_argument("--report", action="store_true", help="make no runs, only the report of those there are")
     paper.add_argument("--out", type=Path, metavar="FOLDER", help="default: benchmarks/paper, or runs/paper-quick")
     paper.add_argument("--work", type=Path, metavar="FOLDER", help="run folders (default: runs/paper, or OUT/work)")

@@ -343,7 +343,7 @@ def _paper(options: argparse.Namespace) -> None:
 
     units = ("raw", "paper") if options.units == "both" else (options.units,)
     run, out, work = not options.report, options.out, options.work
-    make_paper(options.only, units, options.seeds, options.quick, run, out, work)
+    make_paper(options.only, units, options.seeds, options.quick, run, out, work, options.together)
 
 
 def _envs(options: argparse.Namespace) -> None:

@@ -178,7 +178,7 @@ class _Run:
         self.initial_key, self.training_key, _ = _keys(config)
 
     def events(self, state: RunState | None) -> Iterator[Event]:
-        yield Compiled(self.population.compile(evaluation_keys(self.config)), len(self.population.devices))
+        yield Compiled(self.population.compile(), self.population.devices)
         if state is None:
             finished = self.warm_up()
             yield finished

@@ -24,8 +24,8 @@ def share_compiled_programs(patch):
     class CompiledOnce(Population):
         seconds = None
 
-        def compile(self, start_keys):
-            self.seconds = self.seconds or super().compile(start_keys)
+        def compile(self):
+            self.seconds = self.seconds or super().compile()
             return self.seconds
 
     def shared(environment, config):

@@ -86,7 +86,7 @@ def test_every_part_is_in_the_list():
     assert parts - {"jmorl.__init__", "jmorl.__main__", "jmorl.cli"} == set(MAY_IMPORT) - {"envs"}
 
 
-def test_only_the_population_compiles_training():
+def test_only_the_programs_compile_training():
     """One place decides what is traced: elsewhere in the learner there is no `jit`."""
     for path in files("jmorl.learning"):
-        assert ("jax.jit(" in path.read_text()) == (path.name == "population.py"), path
+        assert ("jax.jit(" in path.read_text()) == (path.name == "programs.py"), path

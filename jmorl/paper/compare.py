@@ -77,7 +77,7 @@ def compare(
         for name, method in methods.items():
             cells = [_cell(environment, name, method, target, values, seed) for seed in seeds]
             for cell in missing(cells, places):
-                make(cell, places, lambda *_: None, partial(_user, method, values))
+                make([cell], places, lambda *_: None, partial(_user, method, values))
             records = [read_record(places.record(cell)) for cell in cells]
             rows.append(target_row(target, values, name, seeds, records, budget))
     comparison = Comparison(tuple(rows))

@@ -74,7 +74,7 @@ class Published:
 class Honest:
     """What was fixed for an environment in raw units, before the comparison, and why."""
 
-    targets: Targets | None  # None: not fixed yet
+    targets: Targets
     targets_reason: str
     span: tuple[float, ...] | None  # [M] what normalised utilities divide by
     span_reason: str

@@ -93,17 +93,17 @@ def costs(rows: Sequence[TargetRow], published: PublishedTable) -> str:
         first = asked.before_first if interactive else row.seconds
         lines.append(
             [
-                *(row.target, row.method, duration(row.seconds), duration(theirs) if theirs else ""),
+                *(row.target, row.method, _time(row.seconds), duration(theirs) if theirs else ""),
                 f"{asked.questions:.1f}" if interactive else "1, at the end",
-                duration(first),
-                _wait(asked.between) if interactive else "",
+                _time(first),
+                _time(asked.between) if interactive else "",
             ]
         )
     return table(head, lines)
 
 
-def _wait(seconds: float) -> str:
-    """Empty for NaN."""
+def _time(seconds: float) -> str:
+    """Empty for NaN, which is not known."""
     return "" if np.isnan(seconds) else duration(seconds)
 
 
@@ -115,13 +115,13 @@ def waits(rows: Sequence[Curves], steps: int) -> str:
             lines.append([row.user, row.method, *_waiting_cells(row.records)])
         else:
             whole = float(np.mean([seconds_within(record, steps) for record in row.records]))
-            lines.append([row.user, row.method, "1, at the end", duration(whole), ""])
+            lines.append([row.user, row.method, "1, at the end", _time(whole), ""])
     return table(["user", "method", "questions", "before the first", "between"], lines)
 
 
 def _waiting_cells(records: Sequence[RunRecord]) -> list[str]:
     asked = waiting(records)
-    return [f"{asked.questions:.1f}", duration(asked.before_first), _wait(asked.between)]
+    return [f"{asked.questions:.1f}", _time(asked.before_first), _time(asked.between)]
 
 
 def final_waits(found: Mapping[str, Finals], steps: int) -> str:
@@ -130,7 +130,7 @@ def final_waits(found: Mapping[str, Finals], steps: int) -> str:
     for user, finals in found.items():
         lines.append([user, "interactive", *_waiting_cells(finals.runs)])
         pooled = sum(seconds_within(record, steps) for record in finals.sources)
-        lines.append([user, "pgmorl + E-NAUTILUS", str(ENAUTILUS_ITERATIONS), duration(pooled), "at once"])
+        lines.append([user, "pgmorl + E-NAUTILUS", str(ENAUTILUS_ITERATIONS), _time(pooled), "at once"])
     return table(["user", "method", "questions", "before the first", "between"], lines)
 
 

@@ -95,8 +95,8 @@ class Plan:
         shorter = item.env == CHEETAH and units == "raw" and item.kind != "final policies"
         return (*METHODS, SHORTER) if shorter else METHODS
 
-    def targets(self, env: str, units: str) -> Targets | None:
-        """Published in paper units; in raw ones what was fixed beforehand, None if nothing was yet."""
+    def targets(self, env: str, units: str) -> Targets:
+        """Published in paper units; in raw ones what was fixed beforehand."""
         if units == "paper":
             return next(table.targets for table in published().tables.values() if table.env == env)
         return QUICK_TARGETS if self.quick else honest(env).targets
@@ -110,9 +110,7 @@ class Plan:
         return {user: weights if span is None else _normalised(weights, span) for user, weights in USERS.items()}
 
     def cells(self, item: Item, units: str) -> list[Cell]:
-        """The runs that an item needs; none while its targets are not fixed."""
-        if item.kind == "steps to targets" and self.targets(item.env, units) is None:
-            return []
+        """The runs that an item needs."""
         goals = self._goals(item, units)
         seeds = self.seeds_of(item)
         cells = [self.interactive(item, units, goal, seed) for goal in goals for seed in seeds]
@@ -160,8 +158,8 @@ class Plan:
         """Name -> decision maker, as a config has it."""
         if item.kind == "steps to targets":
             unscaled = ",unscaled" if units == "paper" else ""
-            targets = self.targets(item.env, units) or {}
-            return {name: f"target={_listed(target)}{unscaled}" for name, target in targets.items()}
+            targets = self.targets(item.env, units).items()
+            return {name: f"target={_listed(target)}{unscaled}" for name, target in targets}
         weights = self.user_weights(item, units)
         return {user: user if weights[user] == USERS[user] else f"weights={_listed(weights[user])}" for user in USERS}
 

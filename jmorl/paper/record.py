@@ -50,7 +50,7 @@ class GenerationRecord:
 
     @property
     def seconds(self) -> float:
-        """What somebody at the screen waited for, apart from compilation."""
+        """What the generation took, apart from compilation."""
         return self.select_seconds + self.train_seconds + self.evaluate_seconds
 
 
@@ -92,6 +92,7 @@ class RunRecord:
     policies: tuple[PolicyRecord, ...]
     format: int = FORMAT
     fault: str | None = None  # why it broke down
+    together: tuple[str, ...] = ()  # keys of the cells made in one program, if with others; its times are theirs, too
 
     @cached_property
     def values(self) -> np.ndarray:  # [N, M]
@@ -114,8 +115,12 @@ class RunRecord:
 
     @property
     def seconds(self) -> np.ndarray:  # [G + 1]
-        """Since the start, compilation not counted."""
-        return np.cumsum([generation.seconds for generation in self.generations])
+        """Somebody at the screen waits for, since the start, compilation not counted.
+
+        NaN if the run was made together with others: nobody waits for those.
+        """
+        taken = np.cumsum([generation.seconds for generation in self.generations])
+        return np.full_like(taken, np.nan) if self.together else taken
 
     @property
     def total_steps(self) -> int:
@@ -124,6 +129,11 @@ class RunRecord:
     @property
     def total_seconds(self) -> float:
         return float(self.seconds[-1]) if self.generations else 0.0
+
+    @property
+    def machine_seconds(self) -> float:
+        """The machine was busy with the run, and with those made together with it."""
+        return sum(generation.seconds for generation in self.generations)
 
     @property
     def in_paper_units(self) -> bool:

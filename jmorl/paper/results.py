@@ -124,7 +124,7 @@ def pair_of(rows: Sequence[TargetRow]) -> Pair | None:
 def target_rows(plan: Plan, item: Item, units: str, records: Records) -> list[TargetRow]:
     """A row for each target and method that has a run."""
     rows = []
-    for name, values in (plan.targets(item.env, units) or {}).items():
+    for name, values in plan.targets(item.env, units).items():
         for method in plan.methods(item, units):
             there = _there(plan, item, units, method, name, records)
             if there:

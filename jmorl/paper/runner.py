@@ -4,14 +4,17 @@ records/KEY.json  what is kept of a run that ended or broke down; delete it, and
 work/KEY/         its run folder, from which it is resumed
 """
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import envs
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.learning.population import Population, TrainingFault
+from jmorl.learning.stack import Seat, Stack
 from jmorl.paper.plan import Cell
 from jmorl.paper.record import RunRecord, broken_record, is_record_of, read_record, record_of, write_record
 from jmorl.run import Event
@@ -45,40 +48,63 @@ def known(cells: Sequence[Cell], places: Places) -> dict[str, RunRecord]:
     }
 
 
-def make(cell: Cell, places: Places, watch: Watch, user: Callable[[], DecisionMaker] | None = None) -> RunRecord:
-    """Make one run, or the rest of it, and keep its record. `user` defaults to the one that the config names.
+def make(
+    cells: Sequence[Cell], places: Places, watch: Watch, user: Callable[[], DecisionMaker] | None = None
+) -> list[RunRecord]:
+    """Make runs of one `shape`, or what is left of them, together in one program, and keep their records.
 
-    What `watch` raises breaks the run off; it goes on from its last checkpoint the next time. A run that breaks down by
-    itself would do so again: it is kept as it was until then, with its `fault`.
+    `user` defaults to the one that a run's config names. What `watch`, which is called in the threads of the runs,
+    raises breaks a run off; it goes on from its last checkpoint the next time. A run that breaks down by itself would
+    do so again: it is kept as it was until then, with its `fault`.
     """
+    stack = _stack(cells[0].config)
+    keys = tuple(cell.key for cell in cells) if len(cells) > 1 else ()
+
+    def make_one(cell: Cell, seat: Seat) -> RunRecord:
+        with seat:
+            record = replace(_made(cell, places, watch, user, seat), together=keys)
+        write_record(places.record(cell), record)
+        return record
+
+    with ThreadPoolExecutor(len(cells)) as pool:
+        return list(pool.map(make_one, cells, stack.seats(len(cells))))
+
+
+def together(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
+    """The cells in order, up to so many that follow each other and have one shape at a time."""
+    for _, alike in groupby(cells, lambda cell: shape(cell.config)):
+        some = list(alike)
+        yield from (some[start : start + most] for start in range(0, len(some), most))
+
+
+def shape(config: Config) -> Hashable:
+    """Equal for runs that can share a program."""
+    return config.env, config.population.agents, config.ppo, config.evaluation
+
+
+def _made(cell: Cell, places: Places, watch: Watch, user: Callable[[], DecisionMaker] | None, seat: Seat) -> RunRecord:
     folder = places.work / cell.key
     try:
         continued = _begun(cell, folder)
     except AlreadyFinished:
-        pass
-    else:
-        try:
-            with continued.folder:
-                for event in continued.events(user() if user else None, population=_population(cell.config)):
-                    watch(cell, event)
-        except TrainingFault as fault:
-            return _kept(cell, places, broken_record(folder, cell.config, str(fault)))
-    return _kept(cell, places, record_of(read_run(folder)))
+        return record_of(read_run(folder))
+    population = Population(continued.folder.environment, cell.config, seat)
+    try:
+        with continued.folder:
+            for event in continued.events(user() if user else None, population=population):
+                watch(cell, event)
+    except TrainingFault as fault:
+        return broken_record(folder, cell.config, str(fault))
+    return record_of(read_run(folder))
 
 
-def _kept(cell: Cell, places: Places, record: RunRecord) -> RunRecord:
-    write_record(places.record(cell), record)
-    return record
+_stacks: dict[Hashable, Stack] = {}  # a few: compiled once, and used by all runs of one shape
 
 
-_populations: dict[Hashable, Population] = {}  # a few: compiled once, and used by all runs of equal shapes
-
-
-def _population(config: Config) -> Population:
-    shape = config.env, config.population, config.ppo, config.evaluation
-    if shape not in _populations:
-        _populations[shape] = Population(envs.make(config.env), config)
-    return _populations[shape]
+def _stack(config: Config) -> Stack:
+    if shape(config) not in _stacks:
+        _stacks[shape(config)] = Stack(envs.make(config.env), config)
+    return _stacks[shape(config)]
 
 
 def _begun(cell: Cell, folder: Path) -> Continued:

@@ -24,6 +24,7 @@ def state(plan: Plan, items: Sequence[Item], units: Sequence[str], records: Reco
         _commits(there),
         markdown.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)),
         _beside_the_papers(wanted, records),
+        _waits(there),
         "\n".join([*_missing(wanted, records), *_broken(wanted, records)]),
     ]
     return "\n\n".join(filter(None, parts))
@@ -38,7 +39,13 @@ def _steps(runs: Sequence[RunRecord]) -> int:
 
 
 def _seconds(runs: Sequence[RunRecord]) -> float:
-    return sum(run.total_seconds for run in runs)
+    """The machine was busy for. Runs that are made together begin together, so the longest has the time of them all."""
+    alone = sum(run.machine_seconds for run in runs if not run.together)
+    longest: dict[tuple[str, ...], float] = {}
+    for run in runs:
+        if run.together:
+            longest[run.together] = max(run.machine_seconds, longest.get(run.together, 0.0))
+    return alone + sum(longest.values())
 
 
 def _commits(runs: Sequence[RunRecord]) -> str:
@@ -50,6 +57,16 @@ def _commits(runs: Sequence[RunRecord]) -> str:
     told = ", ".join(f"{commit} ({count} runs)" for commit, count in counts.items())
     mixed = " They are of several commits, between which the code may have changed." if len(counts) > 1 else ""
     return f"Commits of the records: {told}.{mixed}"
+
+
+def _waits(runs: Sequence[RunRecord]) -> str:
+    shared = sum(1 for run in runs if run.together)
+    if not shared:
+        return ""
+    return (
+        f"{shared} runs were made several at a time in one program: what they took is counted once for those of one "
+        "program, and nothing is said of how long a person would wait in them."
+    )
 
 
 def _parts(wanted: Wanted, records: Records) -> Iterator[list[str]]:
@@ -83,8 +100,6 @@ def _missing(wanted: Wanted, records: Records) -> Iterator[str]:
         absent = [cell.key for cell in some if cell.key not in records]
         if absent:
             yield f"- Missing: {item.name} in {units} units, {len(absent)} of {len(some)} runs: {_named(absent)}."
-        if not some:
-            yield f"- Missing: {item.name} in {units} units, whose targets are not fixed yet."
 
 
 def _named(keys: Sequence[str]) -> str:

@@ -6,7 +6,8 @@ import pytest
 
 from jmorl.config import Config
 from jmorl.learning.moppo import MOPPO, Schedule
-from jmorl.learning.population import Population, TrainingFault, device_count
+from jmorl.learning.population import Population, TrainingFault
+from jmorl.learning.programs import CompiledPrograms, device_count
 from tests.probes import Faulty, ThreeWays
 
 CONFIG = Config(
@@ -19,9 +20,9 @@ ITERATIONS = 3
 RATE = 3e-4
 
 
-def compiled(environment, config=CONFIG, episodes=2):
+def compiled(environment, config=CONFIG):
     population = Population(environment, config)
-    population.compile(jax.random.split(jax.random.key(9), episodes))
+    population.compile()
     return population
 
 
@@ -62,23 +63,23 @@ def test_permuted_agents_give_permuted_results(population, start):
     """In one call only tasks differ between agents, so their order must not matter, given the keys."""
     order = np.array([2, 0, 3, 1])
     keys = jax.random.split(jax.random.key(1), 4)
-    plain, _ = population._train(
+    plain, _ = population.programs.train(
         start, WEIGHTS.astype(np.float32), keys, Schedule(np.int32(ITERATIONS), np.float32(RATE))
     )
-    permuted, _ = population._train(
+    permuted, _ = population.programs.train(
         agent(start, order),
         WEIGHTS[order].astype(np.float32),
         keys[order],
         Schedule(np.int32(ITERATIONS), np.float32(RATE)),
     )
-    assert_close(agent(jax.device_get(plain), order), jax.device_get(permuted))
+    assert_close(agent(plain, order), permuted)
 
 
 def test_one_device_or_two_is_the_same(population, start, monkeypatch):
-    assert len(population.devices) == 2
-    monkeypatch.setattr("jmorl.learning.population.device_count", lambda agents, available: 1)
+    assert population.devices == 2
+    monkeypatch.setattr("jmorl.learning.programs.device_count", lambda agents, available: 1)
     single = compiled(ThreeWays())
-    assert len(single.devices) == 1
+    assert single.devices == 1
     assert_close(
         population.train(start, WEIGHTS, jax.random.key(1), ITERATIONS, RATE),
         single.train(start, WEIGHTS, jax.random.key(1), ITERATIONS, RATE),
@@ -90,14 +91,14 @@ def test_in_float64_an_agent_the_order_and_the_devices_differ_by_rounding_alone(
     config = CONFIG.replace(ppo={"hidden_sizes": (4,)})
     order = np.array([2, 0, 3, 1])
     with jax.enable_x64(True):
-        population, keys = Population(ThreeWays(), config), jax.random.split(jax.random.key(1), 4)
-        start = jax.tree.map(in_float64, population.initialize(jax.random.key(0)))
-        together, _ = jax.device_get(population._train(start, WEIGHTS, keys, schedule))
-        permuted, _ = population._train(agent(start, order), WEIGHTS[order], keys[order], schedule)
-        alone = jax.jit(population.moppo.train)
+        programs, keys = CompiledPrograms(ThreeWays(), config, 4), jax.random.split(jax.random.key(1), 4)
+        start = jax.tree.map(in_float64, programs.initialize(jax.random.split(jax.random.key(0), 4)))
+        together, _ = programs.train(start, WEIGHTS, keys, schedule)
+        permuted, _ = programs.train(agent(start, order), WEIGHTS[order], keys[order], schedule)
+        alone = jax.jit(programs.moppo.train)
         singles = [alone(agent(start, index), WEIGHTS[index], keys[index], schedule)[0] for index in range(4)]
-        monkeypatch.setattr("jmorl.learning.population.device_count", lambda agents, available: 1)
-        on_one_device, _ = Population(ThreeWays(), config)._train(start, WEIGHTS, keys, schedule)
+        monkeypatch.setattr("jmorl.learning.programs.device_count", lambda agents, available: 1)
+        on_one_device, _ = CompiledPrograms(ThreeWays(), config, 4).train(start, WEIGHTS, keys, schedule)
     assert {leaf.dtype for leaf in jax.tree.leaves(together.parameters)} == {np.dtype(np.float64)}
     for index, single in enumerate(singles):
         assert_close(agent(together, index), single, 1e-10)

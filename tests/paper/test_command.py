@@ -4,13 +4,14 @@ import re
 import struct
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from jmorl.cli import main
 from jmorl.learning.population import Population, TrainingFault
 from jmorl.paper.plan import ITEMS, Plan
 from jmorl.paper.record import read_record
-from jmorl.paper.runner import Places, make, missing
+from jmorl.paper.runner import Places, make, missing, together
 from jmorl.run import GenerationFinished
 
 CAR_ITEMS = "table1,fig5,fig6,fig9,fig10"
@@ -96,7 +97,7 @@ def test_a_lost_record_comes_from_the_run_folder_without_training(out):
     before = places.record(cell).read_bytes()
     places.record(cell).unlink()
     events = []
-    make(cell, places, lambda _, event: events.append(event))
+    make([cell], places, lambda _, event: events.append(event))
     assert not events and places.record(cell).read_bytes() == before
 
 
@@ -113,11 +114,11 @@ def test_an_interrupted_run_goes_on_to_the_same_record(out, tmp_path, units):
             raise Enough
 
     with pytest.raises(Enough):
-        make(cell, places, stop)
+        make([cell], places, stop)
     assert missing([cell], places) == [cell]
     generations = []
-    resumed = make(
-        cell, places, lambda _, e: isinstance(e, GenerationFinished) and generations.append(e.state.generation)
+    (resumed,) = make(
+        [cell], places, lambda _, e: isinstance(e, GenerationFinished) and generations.append(e.state.generation)
     )
     assert generations == [2]
     expected = read_record(Places(out / "records", out / "work").record(cell))
@@ -129,9 +130,57 @@ def test_an_interrupted_run_goes_on_to_the_same_record(out, tmp_path, units):
 def test_a_run_folder_of_other_settings_is_started_anew(tmp_path):
     first, other = (Plan(quick=True, seeds=(seed,)).cells(ITEMS["fig5"], "raw")[0] for seed in (3, 4))
     places = Places(tmp_path / "records", tmp_path / "work")
-    make(first, places, lambda *_: None)
+    make([first], places, lambda *_: None)
     (places.work / first.key).rename(places.work / other.key)
-    assert make(other, places, lambda *_: None).digest == other.config.digest()
+    assert make([other], places, lambda *_: None)[0].digest == other.config.digest()
+
+
+@pytest.fixture(scope="module")
+def in_threes(tmp_path_factory):
+    """Table 1 in raw units, three runs in one program."""
+    folder = tmp_path_factory.mktemp("threes")
+    arguments = ["--only", "table1", "--units", "raw", "--together", "3"]
+    assert main(["paper", "--quick", *arguments, "--out", str(folder)]) == 0
+    return folder
+
+
+def test_runs_that_share_a_program_find_what_each_finds_alone(out, in_threes):
+    shared = []
+    for cell in Plan(quick=True).cells(ITEMS["table1"], "raw"):
+        found, alone = (read_record(folder / "records" / f"{cell.key}.json") for folder in (in_threes, out))
+        np.testing.assert_allclose(found.values, alone.values, rtol=1e-3)
+        assert (found.reason, found.questions, found.steps.tolist()) == (
+            (alone.reason, alone.questions, alone.steps.tolist())
+        )
+        assert cell.key in found.together and np.isnan(found.seconds).all() and found.machine_seconds > 0
+        shared.append(found.together)
+    assert list(map(len, dict.fromkeys(shared))) == [3, 3, 2]
+
+
+def test_the_report_counts_their_time_once_and_says_nothing_of_waiting(in_threes):
+    text = (in_threes / "REPORT.md").read_text()
+    assert "8 runs were made several at a time in one program" in text and not re.search(r"\bnan\b|None", text)
+    assert "| B | interactive |  | 20 min 31 s | " in text
+
+
+def test_a_run_that_is_broken_off_leaves_those_beside_it_alone(tmp_path):
+    cells = Plan(quick=True).cells(ITEMS["fig5"], "raw")[:2]
+    places = Places(tmp_path / "records", tmp_path / "work")
+
+    def stop(cell, event):
+        if cell == cells[0]:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(cells, places, stop)
+    assert missing(cells, places) == [cells[0]]
+
+
+def test_only_runs_of_one_shape_share_a_program():
+    plan = Plan(quick=True)
+    raw, paper = (plan.cells(ITEMS["fig5"], units) for units in ("raw", "paper"))
+    assert list(together([*raw[:3], *paper[:1]], 2)) == [raw[:2], raw[2:3], paper[:1]]
+    assert list(together(raw, 1)) == [[cell] for cell in raw]
 
 
 def test_the_report_says_what_is_missing(out, tmp_path, capsys):

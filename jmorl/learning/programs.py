@@ -1,0 +1,109 @@
+"""Agents vmapped, and their axis sharded over all devices. The only `jit` of the project."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Protocol
+
+import jax
+import numpy as np
+from jax.sharding import Mesh, PartitionSpec
+
+from envs.core import Environment
+from envs.declared import check_environment
+from jmorl.config import Config
+from jmorl.learning.moppo import MOPPO, Diagnostics, Learner, Schedule
+from jmorl.learning.rollout import EpisodeReturns
+
+AGENTS = "agents"  # the mesh axis
+
+
+class Programs(Protocol):
+    """Training and evaluation of N agents side by side, each of them one call.
+
+    Learners cross this boundary as host arrays with a leading N axis, so that the search can store, mix and
+    inherit them without touching a device.
+    """
+
+    @property
+    def devices(self) -> int:
+        """How many devices the agents are spread over."""
+
+    def compile(self) -> float:
+        """Compile what is to be called. Returns the seconds it took; nothing is traced or compiled a second time."""
+
+    def initialize(self, keys: jax.Array) -> Learner:
+        """A new learner for each key [N]."""
+
+    def train(
+        self, learners: Learner, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[Learner, Diagnostics]:
+        """Train every learner [N, ...] with its weights [N, M] and its key [N]."""
+
+    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
+        """Returns [N, episodes, M] of every learner [N, ...] from its keys [N, episodes]."""
+
+
+class CompiledPrograms:
+    """The programs for one number of agents. Raises NotAsDeclared for an environment that is not what it says."""
+
+    def __init__(self, environment: Environment[Any], config: Config, agents: int):
+        check_environment(environment)
+        self.agents = agents
+        self.episodes = config.evaluation.episodes
+        self._compiled = False
+        self.moppo = MOPPO(environment, config.ppo)
+        self.devices = device_count(agents, jax.device_count())
+        mesh = Mesh(np.array(jax.devices()[: self.devices]), (AGENTS,))
+        self._initialize = jax.jit(jax.vmap(self.moppo.initial_learner))
+        self._train = _sharded(self.moppo.train, mesh, shared=1)
+        sampled, traced = config.evaluation.actions == "sampled", config.evaluation.units == "paper"
+        self._evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
+
+    def compile(self) -> float:
+        if self._compiled:
+            return 0.0
+        started = time.perf_counter()
+        keys = jax.random.split(jax.random.key(0), (self.agents, self.episodes))
+        learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys[:, 0])
+        weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
+        self._train = self._train.lower(learners, weights, keys[:, 0], schedule_of(0, 0.0)).compile()
+        self._evaluate = self._evaluate.lower(learners, keys).compile()
+        self._compiled = True
+        return time.perf_counter() - started
+
+    def initialize(self, keys: jax.Array) -> Learner:
+        return jax.device_get(self._initialize(keys))
+
+    def train(
+        self, learners: Learner, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[Learner, Diagnostics]:
+        return jax.device_get(self._train(learners, weights, keys, schedule))
+
+    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
+        return jax.device_get(self._evaluate(learners, keys))
+
+
+def schedule_of(iterations: int, learning_rate: float) -> Schedule:
+    """As the compiled programs take it."""
+    return Schedule(np.int32(iterations), np.float32(learning_rate))
+
+
+def device_count(agents: int, available: int) -> int:
+    """How many devices so many agents use: the largest divisor of their number that the machine has."""
+    return max(count for count in range(1, min(agents, available) + 1) if agents % count == 0)
+
+
+def _sharded(function: Callable[..., Any], mesh: Mesh, shared: int = 0) -> Any:
+    """`function` of one agent as one compiled call for N: all arguments but the last, `shared` ones have an N axis."""
+
+    def all_agents(*arguments: Any) -> Any:
+        own = len(arguments) - shared
+        axes = (*[0] * own, *[None] * shared)
+        specs = (*[PartitionSpec(AGENTS)] * own, *[PartitionSpec()] * shared)
+        batched = jax.vmap(function, in_axes=axes)
+        return jax.shard_map(batched, mesh=mesh, in_specs=specs, out_specs=PartitionSpec(AGENTS), check_vma=False)(
+            *arguments
+        )
+
+    return jax.jit(all_agents)
