@@ -76,7 +76,6 @@ def _judged(record: RunRecord) -> dict[str, Any]:
         values = record.values[list(record.generations[number].front)]
         point = {
             "steps": record.generations[number].steps,
-            "seconds": round(float(record.seconds[number]), 1),
             "hypervolume": round(hypervolume(values, reference)),
             "utility": [curve_of_user[number] for curve_of_user in utilities],
         }
@@ -101,15 +100,15 @@ def _judged(record: RunRecord) -> dict[str, Any]:
 def tables(rows: list[dict[str, Any]]) -> list[Table]:
     """The runs one by one, and the means over seeds."""
     heads = ("method", "user", "seed", "hypervolume / 1e6", *(f"U {user}" for user in USERS), "fastest m/s")
-    each = Table(*heads, "cheapest above 1 m/s", "front", "seconds", title="Run by run")
-    means = Table(*heads[:2], "seeds", *heads[3:], "seconds", title="Means over the seeds")
+    each = Table(*heads, "cheapest above 1 m/s", "front", title="Run by run")
+    means = Table(*heads[:2], "seeds", *heads[3:], title="Means over the seeds")
     arms = sorted({(row["method"], row["user"] or "") for row in rows})
     for method, user in arms:
         arm = [row for row in rows if (row["method"], row["user"] or "") == (method, user)]
         for row in arm:
             cheapest = "none" if row["cheapest_runner"] is None else "({:.0f}, {:.0f})".format(*row["cheapest_runner"])
-            each.add_row(method, user, str(row["seed"]), *_figures([row]), cheapest, str(row["front"]), _seconds([row]))
-        means.add_row(method, user, str(len(arm)), *_figures(arm), _seconds(arm))
+            each.add_row(method, user, str(row["seed"]), *_figures([row]), cheapest, str(row["front"]))
+        means.add_row(method, user, str(len(arm)), *_figures(arm))
     return [each, means]
 
 
@@ -119,10 +118,6 @@ def _figures(arm: list[dict[str, Any]]) -> list[str]:
         *(f"{np.mean([row['utility'][user] for row in arm]):.0f}" for user in USERS),
         f"{np.mean([row['fastest_metres_per_second'] for row in arm]):.2f}",
     ]
-
-
-def _seconds(arm: list[dict[str, Any]]) -> str:
-    return f"{np.mean([row['curve'][-1]['seconds'] for row in arm]):.0f}"
 
 
 if __name__ == "__main__":
