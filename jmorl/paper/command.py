@@ -11,7 +11,7 @@ from jmorl.display.text import duration, short_count
 from jmorl.paper.naming import named
 from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, SHORTER, Cell, Plan, distinct, in_order
 from jmorl.paper.report import Scope, write_report
-from jmorl.paper.runner import Places, known, make, missing, together
+from jmorl.paper.runner import Places, groups, known, make, missing
 from jmorl.paper.targets import propose
 from jmorl.run import Event, GenerationFinished, RunFinished
 from jmorl.signals import StopSignals
@@ -25,12 +25,12 @@ def make_paper(
     run: bool,
     out: Path | None = None,
     work: Path | None = None,
-    most: int = 1,
+    together: int = 1,
 ) -> None:
     """Make what is missing of the items named, all by default, and write the report; without `run` only that.
 
-    Up to `most` runs are made in one program. `only` may have "targets": runs on other seeds, from which targets for
-    HalfCheetah are proposed.
+    Up to `together` runs are made in one program. `only` may have "targets": runs on other seeds, from which targets
+    for HalfCheetah are proposed.
     """
     console = Console()
     plan = Plan(quick, tuple(seeds) if seeds else None)
@@ -45,7 +45,7 @@ def make_paper(
         later = [cell for cell in cells if cell.later]
         parts += [_Part(f"{item.name}, {named(SHORTER)}", each, later)] if later else []
     if run:
-        _make_all(parts, places, most, console)
+        _make_all(parts, places, together, console)
     if only and "targets" in only:
         proposed = propose(CHEETAH, known(plan.pilots(CHEETAH), places))
         console.print(proposed, soft_wrap=True, highlight=False)
@@ -64,14 +64,14 @@ class _Part:
     cells: Sequence[Cell]
 
 
-def _make_all(parts: Sequence[_Part], places: Places, most: int, console: Console) -> None:
+def _make_all(parts: Sequence[_Part], places: Places, together: int, console: Console) -> None:
     """Every part's missing runs. What two parts share is made with the first."""
     with StopSignals("stopping after this generation; the same command goes on from there") as stop:
         for part in parts:
             name = f"{part.name}, {part.units} units"
             todo = missing(part.cells, places)
             started, steps, made = time.monotonic(), 0, 0
-            for cells in together(todo, most):
+            for cells in groups(todo, together):
                 numbers = f"{made + 1} to {made + len(cells)}" if len(cells) > 1 else f"{made + 1}"
                 steps += _make_some(cells, places, f"{name}, {numbers} of {len(todo)}", console, stop)
                 made += len(cells)
@@ -86,7 +86,7 @@ def _make_some(cells: Sequence[Cell], places: Places, name: str, console: Consol
 
         def watch(cell: Cell, event: Event) -> None:
             if isinstance(event, GenerationFinished):
-                rate = short_count(event.steps_per_second * len(cells))
+                rate = short_count(event.steps_per_second)
                 status.update(f"{name}: {cell.key}, {short_count(event.steps)} steps, {rate} steps/s")
             if not isinstance(event, RunFinished):
                 stop.check()

@@ -118,7 +118,8 @@ def _focus(axes: Axes, utilities: Sequence[np.ndarray]) -> None:
 def _note(axes: Axes, text: str, place: Literal["left", "right"] = "right") -> None:
     """What a picture cuts off, in a lower corner."""
     x = 0.02 if place == "left" else 0.98
-    axes.annotate(text, (x, 0.02), xycoords="axes fraction", ha=place, va="bottom", fontsize=8, color=GREY)
+    lifted = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}  # off the lines below
+    axes.annotate(text, (x, 0.02), xycoords="axes fraction", ha=place, va="bottom", fontsize=8, color=GREY, bbox=lifted)
 
 
 def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:

@@ -115,7 +115,7 @@ class RunRecord:
 
     @property
     def seconds(self) -> np.ndarray:  # [G + 1]
-        """Somebody at the screen waits for, since the start, compilation not counted.
+        """What somebody at the screen waited, since the start, compilation not counted.
 
         NaN if the run was made together with others: nobody waits for those.
         """
@@ -132,7 +132,7 @@ class RunRecord:
 
     @property
     def machine_seconds(self) -> float:
-        """The machine was busy with the run, and with those made together with it."""
+        """How long the machine was busy with the run and those made together with it."""
         return sum(generation.seconds for generation in self.generations)
 
     @property

@@ -53,9 +53,9 @@ def make(
 ) -> list[RunRecord]:
     """Make runs of one `shape`, or what is left of them, together in one program, and keep their records.
 
-    `user` defaults to the one that a run's config names. What `watch`, which is called in the threads of the runs,
-    raises breaks a run off; it goes on from its last checkpoint the next time. A run that breaks down by itself would
-    do so again: it is kept as it was until then, with its `fault`.
+    Several have a thread each, in which `watch` and the users are called; one alone has the caller's. `user` defaults
+    to the one that a run's config names. What `watch` raises breaks a run off; it goes on from its last checkpoint the
+    next time. A run that breaks down by itself would do so again: it is kept as it was until then, with its `fault`.
     """
     stack = _stack(cells[0].config)
     keys = tuple(cell.key for cell in cells) if len(cells) > 1 else ()
@@ -66,11 +66,14 @@ def make(
         write_record(places.record(cell), record)
         return record
 
+    seats = stack.seats(len(cells))
+    if len(cells) == 1:  # an interruption is to reach it at once, and somebody's own user need not know of threads
+        return [make_one(cells[0], seats[0])]
     with ThreadPoolExecutor(len(cells)) as pool:
-        return list(pool.map(make_one, cells, stack.seats(len(cells))))
+        return list(pool.map(make_one, cells, seats))
 
 
-def together(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
+def groups(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
     """The cells in order, up to so many that follow each other and have one shape at a time."""
     for _, alike in groupby(cells, lambda cell: shape(cell.config)):
         some = list(alike)

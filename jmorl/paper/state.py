@@ -39,7 +39,7 @@ def _steps(runs: Sequence[RunRecord]) -> int:
 
 
 def _seconds(runs: Sequence[RunRecord]) -> float:
-    """The machine was busy for. Runs that are made together begin together, so the longest has the time of them all."""
+    """How long the machine was busy. Runs made together begin together, so the longest has the time of them all."""
     alone = sum(run.machine_seconds for run in runs if not run.together)
     longest: dict[tuple[str, ...], float] = {}
     for run in runs:
@@ -65,7 +65,8 @@ def _waits(runs: Sequence[RunRecord]) -> str:
         return ""
     return (
         f"{shared} runs were made several at a time in one program: what they took is counted once for those of one "
-        "program, and nothing is said of how long a person would wait in them."
+        "program, with the compilation of smaller ones for those that were left, and nothing is said of how long a "
+        "person would wait in them."
     )
 
 

@@ -2,6 +2,7 @@
 
 import re
 import struct
+import threading
 from collections import Counter
 
 import numpy as np
@@ -11,7 +12,7 @@ from jmorl.cli import main
 from jmorl.learning.population import Population, TrainingFault
 from jmorl.paper.plan import ITEMS, Plan
 from jmorl.paper.record import read_record
-from jmorl.paper.runner import Places, make, missing, together
+from jmorl.paper.runner import Places, groups, make, missing
 from jmorl.run import GenerationFinished
 
 CAR_ITEMS = "table1,fig5,fig6,fig9,fig10"
@@ -176,11 +177,20 @@ def test_a_run_that_is_broken_off_leaves_those_beside_it_alone(tmp_path):
     assert missing(cells, places) == [cells[0]]
 
 
+def test_a_run_alone_is_made_in_the_callers_thread(tmp_path):
+    """So an interruption reaches it, and somebody's own decision maker need not know of threads."""
+    threads = set()
+    places = Places(tmp_path / "records", tmp_path / "work")
+    cells = Plan(quick=True).cells(ITEMS["fig5"], "raw")[:1]
+    make(cells, places, lambda *_: threads.add(threading.current_thread()))
+    assert threads == {threading.current_thread()}
+
+
 def test_only_runs_of_one_shape_share_a_program():
     plan = Plan(quick=True)
     raw, paper = (plan.cells(ITEMS["fig5"], units) for units in ("raw", "paper"))
-    assert list(together([*raw[:3], *paper[:1]], 2)) == [raw[:2], raw[2:3], paper[:1]]
-    assert list(together(raw, 1)) == [[cell] for cell in raw]
+    assert list(groups([*raw[:3], *paper[:1]], 2)) == [raw[:2], raw[2:3], paper[:1]]
+    assert list(groups(raw, 1)) == [[cell] for cell in raw]
 
 
 def test_the_report_says_what_is_missing(out, tmp_path, capsys):
