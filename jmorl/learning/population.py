@@ -3,7 +3,6 @@
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from envs.core import Environment
@@ -25,7 +24,7 @@ class Population:
 
     def __init__(self, environment: Environment[Any], config: Config, programs: Programs | None = None):
         self.size = config.population.agents
-        self.programs: Programs = programs or CompiledPrograms(environment, config, self.size)
+        self.programs: Programs = programs or CompiledPrograms(environment, config)
 
     @property
     def devices(self) -> int:
@@ -59,7 +58,7 @@ class Population:
 
         Raises TrainingFault, naming the agents, if a return is not finite.
         """
-        returns = self.programs.evaluate(learners, jnp.broadcast_to(keys, (self.size, *keys.shape)))
+        returns = self.programs.evaluate(learners, keys)
         faulty = np.flatnonzero(~np.isfinite(returns.undiscounted).all((1, 2)))
         if len(faulty):
             raise TrainingFault("; ".join(f"agent {agent}: a return is not finite in evaluation" for agent in faulty))

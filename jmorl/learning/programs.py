@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any, Protocol
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
@@ -19,7 +20,7 @@ AGENTS = "agents"  # the mesh axis
 
 
 class Programs(Protocol):
-    """Training and evaluation of N agents side by side, each of them one call.
+    """Training and evaluation of N agents side by side, P of each run, each of them one call.
 
     Learners cross this boundary as host arrays with a leading N axis, so that the search can store, mix and
     inherit them without touching a device.
@@ -41,34 +42,40 @@ class Programs(Protocol):
         """Train every learner [N, ...] with its weights [N, M] and its key [N]."""
 
     def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        """Returns [N, episodes, M] of every learner [N, ...] from its keys [N, episodes]."""
+        """Returns [N, episodes, M] of every learner [N, ...], a run's from equal keys: [episodes] of each in turn."""
 
 
 class CompiledPrograms:
-    """The programs for one number of agents. Raises NotAsDeclared for an environment that is not what it says."""
+    """The programs for so many runs. Raises NotAsDeclared for an environment that is not what it says."""
 
-    def __init__(self, environment: Environment[Any], config: Config, agents: int):
+    def __init__(self, environment: Environment[Any], config: Config, runs: int = 1):
         check_environment(environment)
-        self.agents = agents
+        self.runs = runs
+        self.agents = runs * config.population.agents
         self.episodes = config.evaluation.episodes
         self._compiled = False
         self.moppo = MOPPO(environment, config.ppo)
-        self.devices = device_count(agents, jax.device_count())
+        self.devices = device_count(self.agents, jax.device_count())
         mesh = Mesh(np.array(jax.devices()[: self.devices]), (AGENTS,))
         self._initialize = jax.jit(jax.vmap(self.moppo.initial_learner))
         self._train = _sharded(self.moppo.train, mesh, shared=1)
         sampled, traced = config.evaluation.actions == "sampled", config.evaluation.units == "paper"
-        self._evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
+        evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
+        each = config.population.agents
+        self._evaluate: Any = jax.jit(
+            lambda learners, keys: evaluate(learners, jnp.repeat(keys.reshape(runs, -1), each, axis=0))
+        )
 
     def compile(self) -> float:
         if self._compiled:
             return 0.0
         started = time.perf_counter()
-        keys = jax.random.split(jax.random.key(0), (self.agents, self.episodes))
-        learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys[:, 0])
+        keys = jax.random.split(jax.random.key(0), self.agents)
+        start_keys = jax.random.split(jax.random.key(0), self.runs * self.episodes)
+        learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys)
         weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
-        self._train = self._train.lower(learners, weights, keys[:, 0], schedule_of(0, 0.0)).compile()
-        self._evaluate = self._evaluate.lower(learners, keys).compile()
+        self._train = self._train.lower(learners, weights, keys, schedule_of(0, 0.0)).compile()
+        self._evaluate = self._evaluate.lower(learners, start_keys).compile()
         self._compiled = True
         return time.perf_counter() - started
 

@@ -1,7 +1,7 @@
 """Several runs in one program: runs, with their seeds, as one more axis that is vmapped and sharded.
 
 Each run goes on in a thread of its own and has a seat, which is the programs of its population. What a run finds
-depends in the last bits on how many share a program, as it does on the machine.
+may depend in the last bits on how many share a program, as it does on the machine.
 """
 
 import threading
@@ -29,7 +29,7 @@ class Stack:
     def __init__(self, environment: Environment[Any], config: Config):
         self.environment = environment
         self.config = config
-        self._programs: dict[int, CompiledPrograms] = {}  # by the number of agents
+        self._programs: dict[int, CompiledPrograms] = {}  # by the number of runs
         self._turn = threading.Condition()
         self._seats = 0  # taken
         self._calls: dict[int, _Call] = {}  # of seats that wait, by their number
@@ -74,10 +74,9 @@ class Stack:
             self._answer_if_complete()
 
     def _programs_of(self, runs: int) -> CompiledPrograms:
-        agents = runs * self.config.population.agents
-        if agents not in self._programs:
-            self._programs[agents] = CompiledPrograms(self.environment, self.config, agents)
-        return self._programs[agents]
+        if runs not in self._programs:
+            self._programs[runs] = CompiledPrograms(self.environment, self.config, runs)
+        return self._programs[runs]
 
     def _answer_if_complete(self) -> None:
         if not self._calls or len(self._calls) < self._seats:
@@ -101,7 +100,7 @@ class Stack:
             else:
                 weights = np.concatenate([call.weights for call in calls if call.weights is not None])
                 result = programs.train(learners, weights, keys, schedule)
-            own = len(keys) // len(calls)
+            own = self.config.population.agents
             for index, call in enumerate(calls):
                 call.result = jax.tree.map(partial(_part, start=index * own, stop=(index + 1) * own), result)
         except Exception as error:

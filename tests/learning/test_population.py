@@ -91,14 +91,14 @@ def test_in_float64_an_agent_the_order_and_the_devices_differ_by_rounding_alone(
     config = CONFIG.replace(ppo={"hidden_sizes": (4,)})
     order = np.array([2, 0, 3, 1])
     with jax.enable_x64(True):
-        programs, keys = CompiledPrograms(ThreeWays(), config, 4), jax.random.split(jax.random.key(1), 4)
+        programs, keys = CompiledPrograms(ThreeWays(), config), jax.random.split(jax.random.key(1), 4)
         start = jax.tree.map(in_float64, programs.initialize(jax.random.split(jax.random.key(0), 4)))
         together, _ = programs.train(start, WEIGHTS, keys, schedule)
         permuted, _ = programs.train(agent(start, order), WEIGHTS[order], keys[order], schedule)
         alone = jax.jit(programs.moppo.train)
         singles = [alone(agent(start, index), WEIGHTS[index], keys[index], schedule)[0] for index in range(4)]
         monkeypatch.setattr("jmorl.learning.programs.device_count", lambda agents, available: 1)
-        on_one_device, _ = CompiledPrograms(ThreeWays(), config, 4).train(start, WEIGHTS, keys, schedule)
+        on_one_device, _ = CompiledPrograms(ThreeWays(), config).train(start, WEIGHTS, keys, schedule)
     assert {leaf.dtype for leaf in jax.tree.leaves(together.parameters)} == {np.dtype(np.float64)}
     for index, single in enumerate(singles):
         assert_close(agent(together, index), single, 1e-10)
