@@ -21,11 +21,12 @@ from rich.table import Table
 
 from benchmarks.speed import machine
 from jmorl.config import Config, resolve
+from jmorl.events import GenerationFinished
 from jmorl.learning.devices import use_all_cpu_cores
+from jmorl.loop import run
 from jmorl.report.timeline import Timeline
-from jmorl.run import GenerationFinished, run
 from jmorl.search.archive import Archive
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.storage.checkpoints import CheckpointWriter
 from jmorl.storage.run_folder import folder_bytes
 

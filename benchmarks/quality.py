@@ -26,9 +26,10 @@ from benchmarks.arms import add_arms, arms
 from benchmarks.exact_front import exact_front
 from jmorl.config import Config
 from jmorl.decision.utility import USERS
+from jmorl.events import GenerationFinished, RunFinished
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.moppo import MOPPO
-from jmorl.run import GenerationFinished, RunFinished, evaluation_keys, run
+from jmorl.loop import evaluation_keys, run
 from jmorl.search.policy import Policy, values_of
 
 ENVIRONMENT = "mo-mountaincarcontinuous-v0"

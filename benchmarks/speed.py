@@ -28,12 +28,13 @@ from rich.table import Table
 
 import envs
 from jmorl.config import resolve
+from jmorl.events import Compiled, GenerationFinished
 from jmorl.learning.devices import usable_cores, use_all_cpu_cores
 from jmorl.learning.population import Population
-from jmorl.run import Compiled, GenerationFinished, run
+from jmorl.loop import run
 from jmorl.search.prediction import Records, predict
 from jmorl.search.selection import select_tasks
-from jmorl.search.weights import simplex_grid, spread_weights
+from jmorl.search.weights import evenly_spaced_weights, simplex_grid
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -179,9 +180,11 @@ def _training(env: str, agents: int, environments: int) -> Callable[[], Any]:
     )
     population = Population(envs.make(config.env), config)
     population.compile()
-    learners = population.initialize(jax.random.key(0))
-    weights = spread_weights(2, agents)
-    return lambda: population.train(learners, weights, jax.random.key(1), SCALED_ITERATIONS, config.ppo.learning_rate)
+    train_states = population.initialize(jax.random.key(0))
+    weights = evenly_spaced_weights(2, agents)
+    return lambda: population.train(
+        train_states, weights, jax.random.key(1), SCALED_ITERATIONS, config.ppo.learning_rate
+    )
 
 
 def _median_seconds(call: Callable[[], Any]) -> float:

@@ -30,7 +30,7 @@ from benchmarks.speed import machine
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
 from jmorl.search.policy import Policy
-from jmorl.steering import Prospect
+from jmorl.state import Prospect
 from jmorl.storage.stored_run import read_run
 from jmorl.studio.session import Session
 from jmorl.studio.view import Generation, View

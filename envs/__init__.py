@@ -9,8 +9,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from envs.checks import NotAsDeclared, check_declaration, check_environment
 from envs.core import Environment, EpisodeState, Objective, Step, Transition
-from envs.declared import NotAsDeclared, check_declaration, check_environment
 from envs.failures import failure
 from envs.half_cheetah import HalfCheetah
 from envs.mountain_car import MountainCar

@@ -22,7 +22,7 @@ from jmorl.decision.protocol import DecisionMaker
 from jmorl.signals import Interrupted, StopSignals
 
 if TYPE_CHECKING:
-    from jmorl.storage.continuing import Continued
+    from jmorl.storage.resume import Continued
     from jmorl.studio.session import Session
 
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command. Returns the exit code; argparse itself exits with 2 for unknown flags."""
     options = parse(sys.argv[1:] if arguments is None else arguments)
     sys.path.insert(0, os.getcwd())  # for an environment of one's own, as `--env my_module:my-env-v0`
-    from envs.declared import NotAsDeclared
+    from envs.checks import NotAsDeclared
     from envs.drawing import NoDrawing
     from jmorl.decision.records import ScriptError
     from jmorl.evaluation import NotInGymnasium
@@ -41,9 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from jmorl.paper.record import RecordError
     from jmorl.playback import PlaybackError
     from jmorl.storage.checkpoints import CheckpointError
-    from jmorl.storage.continuing import CannotContinue
     from jmorl.storage.lock import FolderInUse
     from jmorl.storage.policy_file import PolicyFileError
+    from jmorl.storage.resume import CannotContinue
     from jmorl.storage.stored_run import StoredRunError
     from jmorl.storage.versions import NewerFormat
 
@@ -80,7 +80,7 @@ def _train(options: argparse.Namespace) -> None:
 
 def _resume(options: argparse.Namespace) -> None:
     from jmorl.report.plots import draw_run
-    from jmorl.storage.continuing import AlreadyFinished, resume
+    from jmorl.storage.resume import AlreadyFinished, resume
     from jmorl.storage.stored_run import read_run
 
     if not (options.run / "result.json").exists():
@@ -96,7 +96,7 @@ def _resume(options: argparse.Namespace) -> None:
 
 
 def _branch(options: argparse.Namespace) -> None:
-    from jmorl.storage.continuing import branch
+    from jmorl.storage.resume import branch
 
     _check_json(options, options.user or _stored_user(options.run))
     _follow(branch(options.run, options.generation, options.out, options.user, options.force), options)
@@ -105,7 +105,7 @@ def _branch(options: argparse.Namespace) -> None:
 def _begun(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> "Continued":
     """A new run, over defaults of a command's own. Bad input makes nothing."""
     import envs
-    from jmorl.storage.continuing import Continued
+    from jmorl.storage.resume import Continued
     from jmorl.storage.run_folder import RunFolder
 
     config = _checked_config(options, defaults)
@@ -121,9 +121,9 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     """
     from rich.console import Console
 
+    from jmorl.events import RunFinished
     from jmorl.report.plots import draw_run
     from jmorl.report.progress import watcher
-    from jmorl.run import RunFinished
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.run_folder import folder_bytes
     from jmorl.storage.stored_run import read_run

@@ -16,7 +16,7 @@ class Scores(NamedTuple):
     """The scores of P policies."""
 
     values: np.ndarray  # [P, M] in the units of the scorer
-    spread: np.ndarray  # [P, M] standard deviation over the episodes
+    std: np.ndarray  # [P, M] standard deviation over the episodes
     discounted: np.ndarray  # [P, M] mean discounted return, raw
     steps: int  # environment steps of all episodes
     raw: np.ndarray | None = None  # [P, M] mean undiscounted return, where `values` are in other units
@@ -46,4 +46,4 @@ def paper_scores(
         scaled, units = in_running_units(rewards[each][:length], bool(terminated[each]), units, scale_discount)
         worth[each] = powers[:length] @ scaled
     raw = raw_scores(returns)
-    return raw._replace(values=worth.mean(1), spread=worth.std(1), raw=raw.values), units
+    return raw._replace(values=worth.mean(1), std=worth.std(1), raw=raw.values), units

@@ -10,8 +10,8 @@ import envs
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.users import make_user
 from jmorl.learning.population import Population
-from jmorl.storage.continuing import Continued, resume
 from jmorl.storage.policy_file import load_policy
+from jmorl.storage.resume import Continued, resume
 from jmorl.storage.run_folder import RunFolder
 
 TIMES = ("steps_per_second", "select_seconds", "train_seconds", "evaluate_seconds", "total_seconds")
@@ -34,7 +34,7 @@ def share_compiled_programs(patch):
             made[key] = CompiledOnce(environment, config)
         return made[key]
 
-    patch.setattr(sys.modules["jmorl.run"], "Population", shared)
+    patch.setattr(sys.modules["jmorl.loop"], "Population", shared)
 
 
 class Counting(DecisionMaker):

@@ -22,25 +22,25 @@ MAY_IMPORT = {
     "jmorl.scoring": {"jmorl.learning", "jmorl.units"},
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},
-    "jmorl.steering": {"jmorl.config", "jmorl.search", "jmorl.units"},
-    "jmorl.run": {
+    "jmorl.state": {"jmorl.config", "jmorl.search", "jmorl.units"},
+    "jmorl.loop": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),
-        *("jmorl.steering", "jmorl.units"),
+        *("jmorl.state", "jmorl.units"),
     },
     "jmorl.storage": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.run", "jmorl.search"),
-        *("jmorl.steering", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.loop", "jmorl.search"),
+        *("jmorl.state", "jmorl.units"),
     },
     "jmorl.report": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
-        *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage"),
+        *("jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
     },
     "jmorl.studio": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.playback", "jmorl.report"),
-        *("jmorl.run", "jmorl.search", "jmorl.steering", "jmorl.storage", "jmorl.units"),
+        *("jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage", "jmorl.units"),
     },
     "jmorl.paper": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.run"),
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.loop"),
         *("jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
     },
 }
@@ -87,6 +87,6 @@ def test_every_part_is_in_the_list():
 
 
 def test_only_the_programs_compile_training():
-    """One place decides what is traced: elsewhere in the learner there is no `jit`."""
+    """One place decides what is traced: elsewhere in `learning` there is no `jit`."""
     for path in files("jmorl.learning"):
         assert ("jax.jit(" in path.read_text()) == (path.name == "programs.py"), path

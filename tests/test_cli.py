@@ -12,7 +12,7 @@ import envs
 from jmorl import load_policy, read_run
 from jmorl.cli import main
 from jmorl.evaluation import evaluate_stored
-from jmorl.run import evaluation_keys
+from jmorl.loop import evaluation_keys
 from tests.studio.serving import free_port
 
 TRAIN = [

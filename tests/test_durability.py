@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from jmorl.cli import main
-from jmorl.run import GenerationFinished, run
+from jmorl.events import GenerationFinished
+from jmorl.loop import run
 from jmorl.storage.checkpoints import CheckpointWriter, read_checkpoint, stored_generations
-from jmorl.storage.continuing import resume
+from jmorl.storage.resume import resume
 from tests.resuming import go_on, outcome, train
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ from jmorl.cli import main
 from jmorl.storage import checkpoints
 from tests.resuming import outcome
 
-RUN = sys.modules["jmorl.run"]
+RUN = sys.modules["jmorl.loop"]
 NOBODY = 65534
 
 

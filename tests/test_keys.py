@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jmorl.learning.moppo import MOPPO
-from jmorl.run import evaluation_keys, run
+from jmorl.loop import evaluation_keys, run
 
 DRAWS = ("normal", "uniform", "bits")
 DERIVATIONS = ("split", "fold_in")
@@ -68,9 +68,9 @@ def test_no_key_is_used_twice(monkeypatch, config):
 def test_a_key_that_is_used_twice_is_found(monkeypatch, config):
     collect = MOPPO.collect
 
-    def careless(self, learner, workers, key):
+    def careless(self, train_state, rollout_state, key):
         jax.random.normal(key)
-        return collect(self, learner, workers, key)
+        return collect(self, train_state, rollout_state, key)
 
     monkeypatch.setattr(MOPPO, "collect", careless)
     drawn, derived = recorded(monkeypatch, config)

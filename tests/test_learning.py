@@ -8,7 +8,8 @@ import envs
 from benchmarks.exact_front import exact_front
 from jmorl.config import resolve
 from jmorl.decision.utility import USERS
-from jmorl.run import GenerationFinished, RunFinished, evaluation_keys, run
+from jmorl.events import GenerationFinished, RunFinished
+from jmorl.loop import evaluation_keys, run
 from jmorl.search.policy import values_of
 
 pytestmark = pytest.mark.slow

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 
 import envs
+from jmorl.events import GenerationFinished
 from jmorl.learning.population import Population
-from jmorl.run import GenerationFinished, evaluation_keys
+from jmorl.loop import evaluation_keys
 from jmorl.scoring import paper_scores
 from jmorl.search.policy import values_of
-from jmorl.storage.continuing import Continued
 from jmorl.storage.policy_file import load_policy
+from jmorl.storage.resume import Continued
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 from jmorl.units import initial_units
@@ -40,13 +41,15 @@ def test_a_run_in_paper_units_resumes_bit_for_bit(paper_run, paper_config, tmp_p
 
 
 def test_the_scores_are_those_of_one_scorer_fed_in_order(paper_run, paper_config):
-    """Untrained agents first, then one generation after the other, from the policies' own learners."""
+    """Untrained agents first, then one generation after the other, from the policies' own train states."""
     population = Population(envs.make(paper_config.env), paper_config)
     units = initial_units(3)
     policies = [policy for event in paper_run[1] for policy in event.offspring]
     for first in range(0, len(policies), 4):
-        learners = jax.tree.map(lambda *leaves: np.stack(leaves), *(p.snapshot for p in policies[first : first + 4]))
-        returns = population.evaluate(learners, evaluation_keys(paper_config, first))
+        train_states = jax.tree.map(
+            lambda *leaves: np.stack(leaves), *(p.snapshot for p in policies[first : first + 4])
+        )
+        returns = population.evaluate(train_states, evaluation_keys(paper_config, first))
         scores, units = paper_scores(returns, units, paper_config.ppo.discount, 0.9)
         np.testing.assert_allclose(scores.values, values_of(policies[first : first + 4]), rtol=1e-5)
         np.testing.assert_allclose(scores.raw, [policy.raw for policy in policies[first : first + 4]], rtol=1e-5)

@@ -10,9 +10,10 @@ import pytest
 import envs
 from envs import NotAsDeclared
 from jmorl.cli import main
-from jmorl.run import Decided, GenerationFinished, RunFinished, run
-from jmorl.storage.continuing import AlreadyFinished, CannotContinue, branch, resume
+from jmorl.events import Decided, GenerationFinished, RunFinished
+from jmorl.loop import run
 from jmorl.storage.lock import FolderInUse
+from jmorl.storage.resume import AlreadyFinished, CannotContinue, branch, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 from jmorl.storage.versions import NewerFormat

@@ -12,8 +12,9 @@ import pytest
 
 from jmorl.config import resolve
 from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.events import Compiled, Decided, GenerationFinished, RunFinished
 from jmorl.learning.population import Population, TrainingFault
-from jmorl.run import Compiled, Decided, GenerationFinished, RunFinished, run
+from jmorl.loop import run
 from jmorl.search.bounds import lower_bounds, within
 from jmorl.search.policy import values_of
 from tests.probes import Faulty, ThreeWays
@@ -243,7 +244,7 @@ def test_two_processes_find_the_same_bytes(small_config, interactive, tmp_path):
         "import sys, tests.conftest\n"
         "from pathlib import Path\n"
         "from jmorl.config import resolve\n"
-        "from jmorl.run import run\n"
+        "from jmorl import run\n"
         "from tests.test_run import Recorder, digest\n"
         f"print(digest(run(resolve(file=Path({str(config)!r})), Recorder(index=1))))\n"
     )

@@ -84,7 +84,7 @@ def test_scores_are_those_of_the_real_wrappers(seed, objectives):
     expected, deviations = wrapped_scores(episodes, objectives)
     scores, units = paper_scores(as_returns(episodes, 4), initial_units(objectives), GAMMA, SCALE_GAMMA)
     np.testing.assert_allclose(scores.values, expected.reshape(4, 3, -1).mean(1), rtol=1e-7)
-    np.testing.assert_allclose(scores.spread, expected.reshape(4, 3, -1).std(1), rtol=1e-6)
+    np.testing.assert_allclose(scores.std, expected.reshape(4, 3, -1).std(1), rtol=1e-6)
     np.testing.assert_allclose(units.deviation, deviations, rtol=1e-7)
     assert scores.steps == sum(len(rewards) for rewards, _ in episodes)
     np.testing.assert_allclose(scores.raw, raw_scores(as_returns(episodes, 4)).values)

@@ -35,9 +35,9 @@ def front_table(
     bounds [M] is dimmed.
     """
     values = values_of(list(policies))
-    spreads = np.stack([policy.spread for policy in policies])
+    stds = np.stack([policy.std for policy in policies])
     bounded = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
-    scores = [_scores(*column) for column in zip(values.T, spreads.T, strict=True)]
+    scores = [_scores(*column) for column in zip(values.T, stds.T, strict=True)]
     table = plain_table("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
@@ -106,10 +106,10 @@ def stacked_label(objective: Objective) -> str:
     return f"{objective.label}\n({objective.unit})"
 
 
-def _scores(values: np.ndarray, spreads: np.ndarray) -> list[str]:
+def _scores(values: np.ndarray, stds: np.ndarray) -> list[str]:
     """`-66.1  ±0.4` for each of the values [N], the values under each other."""
     fmt = number_format(values)
-    texts = [f"±{spread:{fmt}}" for spread in spreads]
+    texts = [f"±{std:{fmt}}" for std in stds]
     width = max(map(len, texts))
     return [f"{value:{fmt}} {text:>{width}}" for value, text in zip(values, texts, strict=True)]
 

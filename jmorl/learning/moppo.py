@@ -32,7 +32,7 @@ Parameters = Any  # {"actor": ..., "critic": ...}, pytrees of flax.linen
 
 
 @struct.dataclass
-class Learner:
+class TrainState:
     """All that an offspring inherits and that is stored with a policy."""
 
     parameters: Parameters
@@ -42,7 +42,7 @@ class Learner:
 
 
 @struct.dataclass
-class Workers:
+class RolloutState:
     """The environments of one agent, between two rollouts."""
 
     states: EpisodeState[Any]  # [E]
@@ -110,7 +110,7 @@ class MOPPO:
         clip = optax.clip_by_global_norm(self.config.max_gradient_norm)
         return optax.flatten(optax.chain(clip, optax.scale_by_adam(eps=self.config.adam_epsilon)))
 
-    def initial_learner(self, key: jax.Array) -> Learner:
+    def initial_train_state(self, key: jax.Array) -> TrainState:
         """A new agent's networks, optimiser and statistics."""
         actor_key, critic_key = jax.random.split(key)
         observation = jnp.zeros(self.environment.observation_size)
@@ -118,7 +118,7 @@ class MOPPO:
             "actor": self.actor.init(actor_key, observation),
             "critic": self.critic.init(critic_key, observation),
         }
-        return Learner(
+        return TrainState(
             parameters,
             self.optimizer.init(parameters),
             initial_statistics((self.environment.observation_size,)),
@@ -126,61 +126,61 @@ class MOPPO:
         )
 
     def train(
-        self, learner: Learner, weights: jax.Array, key: jax.Array, schedule: Schedule
-    ) -> tuple[Learner, Diagnostics]:
+        self, train_state: TrainState, weights: jax.Array, key: jax.Array, schedule: Schedule
+    ) -> tuple[TrainState, Diagnostics]:
         """PPO iterations with `weights` [M], from freshly reset environments.
 
         Rollouts continue from one iteration to the next.
         """
-        workers_key, iterations_key = jax.random.split(key)
+        rollout_state_key, iterations_key = jax.random.split(key)
         zero = jnp.zeros(())
         start = Diagnostics(zero, zero, zero, zero, jnp.array(0), jnp.array(0))
 
         def body(index: jax.Array, carry: Any) -> Any:
-            learner, workers, previous = carry
+            train_state, rollout_state, previous = carry
             iteration_key = jax.random.fold_in(iterations_key, index)
-            learner, workers, diagnostics = self.iteration(
-                learner, workers, weights, iteration_key, schedule.learning_rate
+            train_state, rollout_state, diagnostics = self.iteration(
+                train_state, rollout_state, weights, iteration_key, schedule.learning_rate
             )
-            return learner, workers, _keep_first_fault(previous, diagnostics, index + 1)
+            return train_state, rollout_state, _keep_first_fault(previous, diagnostics, index + 1)
 
-        learner, _, diagnostics = jax.lax.fori_loop(
-            0, schedule.iterations, body, (learner, self.start_workers(workers_key), start)
+        train_state, _, diagnostics = jax.lax.fori_loop(
+            0, schedule.iterations, body, (train_state, self.initial_rollout_state(rollout_state_key), start)
         )
-        return learner, diagnostics
+        return train_state, diagnostics
 
-    def start_workers(self, key: jax.Array) -> Workers:
+    def initial_rollout_state(self, key: jax.Array) -> RolloutState:
         """E environments at the start of an episode."""
         states, observations = jax.vmap(self.environment.reset)(jax.random.split(key, self.config.environments))
         sums = jnp.zeros((self.config.environments, len(self.environment.objectives)))
-        return Workers(states, observations, sums)
+        return RolloutState(states, observations, sums)
 
     def iteration(
         self,
-        learner: Learner,
-        workers: Workers,
+        train_state: TrainState,
+        rollout_state: RolloutState,
         weights: jax.Array,
         key: jax.Array,
         learning_rate: jax.typing.ArrayLike,
-    ) -> tuple[Learner, Workers, Diagnostics]:
+    ) -> tuple[TrainState, RolloutState, Diagnostics]:
         """Collect E*T steps, then update on them."""
         rollout_key, update_key = jax.random.split(key)
-        workers, trajectory, return_statistics = self.collect(learner, workers, rollout_key)
-        batch = self.batch(learner, trajectory, return_scale(return_statistics), weights)
-        parameters, optimizer_state, diagnostics = self.update(learner, batch, update_key, learning_rate)
-        updated = Learner(
+        rollout_state, trajectory, return_statistics = self.collect(train_state, rollout_state, rollout_key)
+        batch = self.batch(train_state, trajectory, return_scale(return_statistics), weights)
+        parameters, optimizer_state, diagnostics = self.update(train_state, batch, update_key, learning_rate)
+        updated = TrainState(
             parameters,
             optimizer_state,
-            update_statistics(learner.observation_statistics, trajectory.observation),
+            update_statistics(train_state.observation_statistics, trajectory.observation),
             return_statistics,
         )
-        return updated, workers, diagnostics._replace(fault=_fault(trajectory, parameters, diagnostics))
+        return updated, rollout_state, diagnostics._replace(fault=_fault(trajectory, parameters, diagnostics))
 
     def collect(
-        self, learner: Learner, workers: Workers, key: jax.Array
-    ) -> tuple[Workers, Trajectory, RunningStatistics]:
+        self, train_state: TrainState, rollout_state: RolloutState, key: jax.Array
+    ) -> tuple[RolloutState, Trajectory, RunningStatistics]:
         """T steps in every environment: where to continue, the trajectories [E, T, ...], the updated reward scale."""
-        policy = self.policy(learner)
+        policy = self.policy(train_state)
         keys = jax.random.split(key, self.config.environments)
         (states, observations), trajectory = jax.vmap(
             lambda key, state, observation: rollout(
@@ -191,25 +191,27 @@ class MOPPO:
                 self.config.rollout_steps,
                 self.config.noise_correlation,
             )
-        )(keys, workers.states, workers.observations)
+        )(keys, rollout_state.states, rollout_state.observations)
         ended = trajectory.terminated | trajectory.truncated
         sums, carried = jax.vmap(discounted_sums, in_axes=(0, 0, 0, None))(
-            trajectory.reward, ended, workers.discounted_sums, self.config.discount
+            trajectory.reward, ended, rollout_state.discounted_sums, self.config.discount
         )
-        statistics = update_statistics(learner.return_statistics, sums)
-        return Workers(states, observations, carried), trajectory, statistics
+        statistics = update_statistics(train_state.return_statistics, sums)
+        return RolloutState(states, observations, carried), trajectory, statistics
 
-    def batch(self, learner: Learner, trajectory: Trajectory, reward_scale: jax.Array, weights: jax.Array) -> Batch:
+    def batch(
+        self, train_state: TrainState, trajectory: Trajectory, reward_scale: jax.Array, weights: jax.Array
+    ) -> Batch:
         """Trajectories [E, T, ...] to what PPO learns from [E*T, ...], with advantages scalarised by `weights`.
 
         Values are learned in reward-scaled units whatever the weights act on: only then does one learning rate
         suit every objective. The statistics are those the policy acted with.
         """
-        observation = normalize(learner.observation_statistics, trajectory.observation)
-        mean, log_std = self.actor.apply(learner.parameters["actor"], observation)
-        value = self.critic.apply(learner.parameters["critic"], observation)
-        final_observation = normalize(learner.observation_statistics, trajectory.final_observation)
-        final_value = self.critic.apply(learner.parameters["critic"], final_observation)
+        observation = normalize(train_state.observation_statistics, trajectory.observation)
+        mean, log_std = self.actor.apply(train_state.parameters["actor"], observation)
+        value = self.critic.apply(train_state.parameters["critic"], observation)
+        final_observation = normalize(train_state.observation_statistics, trajectory.final_observation)
+        final_value = self.critic.apply(train_state.parameters["critic"], final_observation)
         advantage = jax.vmap(generalized_advantages, in_axes=(0, 0, 0, 0, 0, None, None))(
             trajectory.reward / reward_scale,
             value,
@@ -232,7 +234,7 @@ class MOPPO:
         return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), batch)
 
     def update(
-        self, learner: Learner, batch: Batch, key: jax.Array, learning_rate: jax.typing.ArrayLike
+        self, train_state: TrainState, batch: Batch, key: jax.Array, learning_rate: jax.typing.ArrayLike
     ) -> tuple[Parameters, optax.OptState, Diagnostics]:
         """`epochs` passes over the batch, each in a new order and `minibatches` steps of the optimiser."""
         size = batch.advantage.shape[0]
@@ -245,7 +247,7 @@ class MOPPO:
             return self.gradient_step(carry, jax.tree.map(lambda x: x[indices], batch), learning_rate)
 
         epoch_keys = jax.random.split(key, self.config.epochs)
-        carry, diagnostics = jax.lax.scan(epoch, (learner.parameters, learner.optimizer_state), epoch_keys)
+        carry, diagnostics = jax.lax.scan(epoch, (train_state.parameters, train_state.optimizer_state), epoch_keys)
         return *carry, jax.tree.map(lambda x: x[-1].mean(0), diagnostics)
 
     def gradient_step(
@@ -278,17 +280,17 @@ class MOPPO:
         kl = (batch.log_probability - log_probability).mean()
         return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0))
 
-    def policy(self, learner: Learner) -> Any:
-        """The learner as a function of one raw observation [O]: (mean action [A], log-std [A])."""
+    def policy(self, train_state: TrainState) -> Any:
+        """The agent as a function of one raw observation [O]: (mean action [A], log-std [A])."""
         return lambda observation: self.actor.apply(
-            learner.parameters["actor"], normalize(learner.observation_statistics, observation)
+            train_state.parameters["actor"], normalize(train_state.observation_statistics, observation)
         )
 
     def evaluate(
-        self, learner: Learner, keys: jax.Array, sampled: bool = False, traced: bool = False
+        self, train_state: TrainState, keys: jax.Array, sampled: bool = False, traced: bool = False
     ) -> EpisodeReturns:
-        """One episode for each key [episodes], as `episode_returns`, with the learner's frozen statistics."""
-        policy = self.policy(learner)
+        """One episode for each key [episodes], as `episode_returns`, with the agent's frozen statistics."""
+        policy = self.policy(train_state)
         return jax.vmap(
             lambda key: episode_returns(self.environment, policy, key, self.config.discount, sampled, traced)
         )(keys)

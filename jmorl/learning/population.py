@@ -7,7 +7,7 @@ import numpy as np
 
 from envs.core import Environment
 from jmorl.config import Config
-from jmorl.learning.moppo import FAULTS, Diagnostics, Learner
+from jmorl.learning.moppo import FAULTS, Diagnostics, TrainState
 from jmorl.learning.programs import CompiledPrograms, Programs, schedule_of
 from jmorl.learning.rollout import EpisodeReturns
 
@@ -35,30 +35,30 @@ class Population:
         """Compile what is called below. Returns the seconds it took."""
         return self.programs.compile()
 
-    def initialize(self, key: jax.Array) -> Learner:
-        """P new learners [P, ...]."""
+    def initialize(self, key: jax.Array) -> TrainState:
+        """P new train states [P, ...]."""
         return self.programs.initialize(jax.random.split(key, self.size))
 
     def train(
-        self, learners: Learner, weights: np.ndarray, key: jax.Array, iterations: int, learning_rate: float
-    ) -> tuple[Learner, Diagnostics]:
-        """Train every learner [P, ...] with its weights [P, M] for `iterations` PPO iterations at one
+        self, train_states: TrainState, weights: np.ndarray, key: jax.Array, iterations: int, learning_rate: float
+    ) -> tuple[TrainState, Diagnostics]:
+        """Train every agent [P, ...] with its weights [P, M] for `iterations` PPO iterations at one
         learning rate.
 
         Raises TrainingFault, naming agents, causes and iterations, if any number stopped being finite.
         """
         keys = jax.random.split(key, self.size)
         schedule = schedule_of(iterations, learning_rate)
-        learners, diagnostics = self.programs.train(learners, np.asarray(weights, np.float32), keys, schedule)
+        train_states, diagnostics = self.programs.train(train_states, np.asarray(weights, np.float32), keys, schedule)
         _raise_faults(diagnostics)
-        return learners, diagnostics
+        return train_states, diagnostics
 
-    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        """Returns [P, episodes, M] of every learner from the same keys [episodes], with traces for paper units.
+    def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        """Returns [P, episodes, M] of every agent from the same keys [episodes], with traces for paper units.
 
         Raises TrainingFault, naming the agents, if a return is not finite.
         """
-        returns = self.programs.evaluate(learners, keys)
+        returns = self.programs.evaluate(train_states, keys)
         faulty = np.flatnonzero(~np.isfinite(returns.undiscounted).all((1, 2)))
         if len(faulty):
             raise TrainingFault("; ".join(f"agent {agent}: a return is not finite in evaluation" for agent in faulty))

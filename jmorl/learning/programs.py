@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
+from envs.checks import check_environment
 from envs.core import Environment
-from envs.declared import check_environment
 from jmorl.config import Config
-from jmorl.learning.moppo import MOPPO, Diagnostics, Learner, Schedule
+from jmorl.learning.moppo import MOPPO, Diagnostics, Schedule, TrainState
 from jmorl.learning.rollout import EpisodeReturns
 
 AGENTS = "agents"  # the mesh axis
@@ -33,16 +33,16 @@ class Programs(Protocol):
     def compile(self) -> float:
         """Compile what is to be called. Returns the seconds it took; nothing is traced or compiled a second time."""
 
-    def initialize(self, keys: jax.Array) -> Learner:
-        """A new learner for each key [N]."""
+    def initialize(self, keys: jax.Array) -> TrainState:
+        """A new train state for each key [N]."""
 
     def train(
-        self, learners: Learner, weights: np.ndarray, keys: jax.Array, schedule: Schedule
-    ) -> tuple[Learner, Diagnostics]:
-        """Train every learner [N, ...] with its weights [N, M] and its key [N]."""
+        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[TrainState, Diagnostics]:
+        """Train every agent [N, ...] with its weights [N, M] and its key [N]."""
 
-    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        """Returns [N, episodes, M] of every learner [N, ...], a run's from equal keys: [episodes] of each in turn."""
+    def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        """Returns [N, episodes, M] of every agent [N, ...], a run's from equal keys: [episodes] of each in turn."""
 
 
 class CompiledPrograms:
@@ -57,13 +57,13 @@ class CompiledPrograms:
         self.moppo = MOPPO(environment, config.ppo)
         self.devices = device_count(self.agents, jax.device_count())
         mesh = Mesh(np.array(jax.devices()[: self.devices]), (AGENTS,))
-        self._initialize = jax.jit(jax.vmap(self.moppo.initial_learner))
+        self._initialize = jax.jit(jax.vmap(self.moppo.initial_train_state))
         self._train = _sharded(self.moppo.train, mesh, shared=1)
         sampled, traced = config.evaluation.actions == "sampled", config.evaluation.units == "paper"
         evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
         each = config.population.agents
         self._evaluate: Any = jax.jit(
-            lambda learners, keys: evaluate(learners, jnp.repeat(keys.reshape(runs, -1), each, axis=0))
+            lambda train_states, keys: evaluate(train_states, jnp.repeat(keys.reshape(runs, -1), each, axis=0))
         )
 
     def compile(self) -> float:
@@ -72,23 +72,23 @@ class CompiledPrograms:
         started = time.perf_counter()
         keys = jax.random.split(jax.random.key(0), self.agents)
         start_keys = jax.random.split(jax.random.key(0), self.runs * self.episodes)
-        learners = jax.eval_shape(jax.vmap(self.moppo.initial_learner), keys)
+        train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
         weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
-        self._train = self._train.lower(learners, weights, keys, schedule_of(0, 0.0)).compile()
-        self._evaluate = self._evaluate.lower(learners, start_keys).compile()
+        self._train = self._train.lower(train_states, weights, keys, schedule_of(0, 0.0)).compile()
+        self._evaluate = self._evaluate.lower(train_states, start_keys).compile()
         self._compiled = True
         return time.perf_counter() - started
 
-    def initialize(self, keys: jax.Array) -> Learner:
+    def initialize(self, keys: jax.Array) -> TrainState:
         return jax.device_get(self._initialize(keys))
 
     def train(
-        self, learners: Learner, weights: np.ndarray, keys: jax.Array, schedule: Schedule
-    ) -> tuple[Learner, Diagnostics]:
-        return jax.device_get(self._train(learners, weights, keys, schedule))
+        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[TrainState, Diagnostics]:
+        return jax.device_get(self._train(train_states, weights, keys, schedule))
 
-    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        return jax.device_get(self._evaluate(learners, keys))
+    def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        return jax.device_get(self._evaluate(train_states, keys))
 
 
 def schedule_of(iterations: int, learning_rate: float) -> Schedule:

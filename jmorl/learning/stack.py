@@ -18,7 +18,7 @@ import numpy as np
 
 from envs.core import Environment
 from jmorl.config import Config
-from jmorl.learning.moppo import Diagnostics, Learner, Schedule
+from jmorl.learning.moppo import Diagnostics, Schedule, TrainState
 from jmorl.learning.programs import CompiledPrograms
 from jmorl.learning.rollout import EpisodeReturns
 
@@ -52,8 +52,8 @@ class Stack:
         with self._turn:
             return self._programs_of(self._seats).compile()
 
-    def initialize(self, keys: jax.Array) -> Learner:
-        """The first learners of one run."""
+    def initialize(self, keys: jax.Array) -> TrainState:
+        """The first train states of one run."""
         with self._turn:
             return self._programs_of(1).initialize(keys)
 
@@ -92,14 +92,14 @@ class Stack:
         try:
             programs = self._programs_of(len(calls))
             programs.compile()
-            learners = jax.tree.map(lambda *leaves: np.concatenate(leaves), *(call.learners for call in calls))
+            train_states = jax.tree.map(lambda *leaves: np.concatenate(leaves), *(call.train_states for call in calls))
             keys = jnp.concatenate([call.keys for call in calls])
             schedule = calls[0].schedule
             if schedule is None:
-                result: Any = programs.evaluate(learners, keys)
+                result: Any = programs.evaluate(train_states, keys)
             else:
                 weights = np.concatenate([call.weights for call in calls if call.weights is not None])
-                result = programs.train(learners, weights, keys, schedule)
+                result = programs.train(train_states, weights, keys, schedule)
             own = self.config.population.agents
             for index, call in enumerate(calls):
                 call.result = jax.tree.map(partial(_part, start=index * own, stop=(index + 1) * own), result)
@@ -114,7 +114,7 @@ class Stack:
 class _Call:
     """Training, or, without a schedule, evaluation."""
 
-    learners: Learner
+    train_states: TrainState
     keys: jax.Array
     weights: np.ndarray | None = None
     schedule: Schedule | None = None
@@ -147,16 +147,16 @@ class Seat(AbstractContextManager["Seat"]):
     def compile(self) -> float:
         return self._stack.compile()
 
-    def initialize(self, keys: jax.Array) -> Learner:
+    def initialize(self, keys: jax.Array) -> TrainState:
         return self._stack.initialize(keys)
 
     def train(
-        self, learners: Learner, weights: np.ndarray, keys: jax.Array, schedule: Schedule
-    ) -> tuple[Learner, Diagnostics]:
-        return self._stack.call(self._number, _Call(learners, keys, weights, schedule))
+        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[TrainState, Diagnostics]:
+        return self._stack.call(self._number, _Call(train_states, keys, weights, schedule))
 
-    def evaluate(self, learners: Learner, keys: jax.Array) -> EpisodeReturns:
-        return self._stack.call(self._number, _Call(learners, keys))
+    def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        return self._stack.call(self._number, _Call(train_states, keys))
 
 
 def _part(leaf: Any, start: int, stop: int) -> Any:

@@ -8,12 +8,12 @@ from pathlib import Path
 from rich.console import Console
 
 from jmorl.display.text import duration, short_count
+from jmorl.events import Event, GenerationFinished, RunFinished
 from jmorl.paper.naming import named
 from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, SHORTER, Cell, Plan, distinct, in_order
 from jmorl.paper.report import Scope, write_report
 from jmorl.paper.runner import Places, groups, known, make, missing
 from jmorl.paper.targets import propose
-from jmorl.run import Event, GenerationFinished, RunFinished
 from jmorl.signals import StopSignals
 
 

@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 import envs
 from jmorl.config import Config
 from jmorl.decision.records import DecisionRecord
-from jmorl.run import REFERENCE_MARGIN
+from jmorl.loop import REFERENCE_MARGIN
 from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import values_of

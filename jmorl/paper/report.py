@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from jmorl.paper import claims, markdown
-from jmorl.paper.bars import drift_told, explanations, raw_bar
+from jmorl.paper.acceptance import drift_told, explanations, raw_bar
 from jmorl.paper.data import PublishedTable, honest, published
 from jmorl.paper.figures import draw
 from jmorl.paper.introduction import DEVIATIONS, DIFFERENT_UNITS, INTRODUCTION, MEAN_UTILITY, POOLED, SWAPPED

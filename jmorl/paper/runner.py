@@ -13,12 +13,12 @@ from pathlib import Path
 import envs
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
+from jmorl.events import Event
 from jmorl.learning.population import Population, TrainingFault
 from jmorl.learning.stack import Seat, Stack
 from jmorl.paper.plan import Cell
 from jmorl.paper.record import RunRecord, broken_record, is_record_of, read_record, record_of, write_record
-from jmorl.run import Event
-from jmorl.storage.continuing import AlreadyFinished, Continued, resume
+from jmorl.storage.resume import AlreadyFinished, Continued, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 

@@ -18,9 +18,9 @@ from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.fronts import front_scatter, front_table
 from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.events import Event, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.report.watchers import Watcher, show_result
-from jmorl.run import Event, RunFinished
 from jmorl.search.policy import values_of
 
 REFRESH_RATE = 4  # per second; a frame takes a few milliseconds

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from jmorl.report.front_plot import front_figure
-from jmorl.report.many_plot import pairs_figure, parallel_figure
+from jmorl.report.parallel_coordinates import pairs_figure, parallel_figure
 from jmorl.report.run_plots import prediction_figure, progress_figure
 from jmorl.report.style import save, style
 from jmorl.storage.stored_run import StoredRun

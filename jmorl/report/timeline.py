@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from jmorl.config import Config
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
-from jmorl.steering import RunState
+from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
+from jmorl.state import RunState
 
 Phase = Literal["compiling", "warm-up", "generation", "question", "finished"]
 

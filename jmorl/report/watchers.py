@@ -15,8 +15,8 @@ from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.fronts import front_table
 from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.search.policy import Policy
 
 
@@ -98,7 +98,7 @@ class Lines(Watcher):
 class Json(Watcher):
     """One JSON object per line for every event, for other programs. Numbers that are not finite are null.
 
-    `event` says which one, and `values`, `spread`, `weights` and `bounds` have a number for each objective:
+    `event` says which one, and `values`, `std`, `weights` and `bounds` have a number for each objective:
 
         {"event": "compiled", "seconds", "devices"}
         {"event": "resumed", "generation": the last one finished, "steps"}
@@ -111,7 +111,7 @@ class Json(Watcher):
          "bounds": that follow, "shown": how many policies, "stop", "generations": before the next question, "seconds"}
         {"event": "finished", "reason": "budget", "satisfied" or "stopped", "chosen": policy}
 
-    A policy is {"policy": its id, "generation", "parent", "weights", "values", "spread"}.
+    A policy is {"policy": its id, "generation", "parent", "weights", "values", "std"}.
     """
 
     def __init__(self, config: Config, file: TextIO):
@@ -204,7 +204,7 @@ def _policy_fields(policy: Policy) -> dict[str, Any]:
         "parent": policy.parent,
         "weights": policy.weights.tolist(),
         "values": policy.values.tolist(),
-        "spread": policy.spread.tolist(),
+        "std": policy.std.tolist(),
     }
 
 

@@ -72,13 +72,13 @@ def fit_cost(parameters: np.ndarray, x: np.ndarray, y: np.ndarray, importance: n
 
 def _box_and_start(y: np.ndarray, present: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Lower bounds, upper bounds and start of each fit, all [4, F]."""
-    spread = np.where(present, y, -np.inf).max(axis=0) - np.where(present, y, np.inf).min(axis=0)
+    extent = np.where(present, y, -np.inf).max(axis=0) - np.where(present, y, np.inf).min(axis=0)
     mean = np.where(present, y, 0.0).sum(axis=0) / present.sum(axis=0)
-    same = np.ones_like(spread)
+    same = np.ones_like(extent)
     bounds = (STEEPNESS_BOUNDS, CENTRE_BOUNDS, OFFSET_BOUNDS)
     lower = np.stack([0 * same, *(low * same for low, _ in bounds)])
-    upper = np.stack([np.clip(spread, *AMPLITUDE_LIMITS), *(high * same for _, high in bounds)])
-    return lower, upper, np.clip([spread / 2, same, 0 * same, mean], lower, upper)
+    upper = np.stack([np.clip(extent, *AMPLITUDE_LIMITS), *(high * same for _, high in bounds)])
+    return lower, upper, np.clip([extent / 2, same, 0 * same, mean], lower, upper)
 
 
 def _derivatives(

@@ -20,7 +20,7 @@ class Policy:
     parent: int | None  # id of the policy whose training was continued
     weights: np.ndarray  # [M] the weights it was trained with
     values: np.ndarray  # [M] z, its score: maximised
-    spread: np.ndarray  # [M] standard deviation of the score over the evaluation episodes
+    std: np.ndarray  # [M] standard deviation of the score over the evaluation episodes
     discounted: np.ndarray  # [M] mean discounted return
     snapshot: Any = field(repr=False)  # parameters, optimiser state and statistics
     predicted: np.ndarray | None = None  # [M] the values the search expected; None in the warm-up

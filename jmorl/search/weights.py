@@ -11,7 +11,7 @@ def simplex_grid(objectives: int, divisions: int) -> np.ndarray:
     return _grid_steps(objectives, divisions) / divisions
 
 
-def spread_weights(objectives: int, count: int) -> np.ndarray:
+def evenly_spaced_weights(objectives: int, count: int) -> np.ndarray:
     """`count` weights spread evenly over the simplex, [count, M].
 
     One weight is the centre. Two objectives: from (0, 1) to (1, 0) in equal steps. More: the corners first,

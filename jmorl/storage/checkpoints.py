@@ -1,6 +1,6 @@
 """Checkpoints of a run: `checkpoints/GENERATION/`, each on its own enough to go on from.
 
-arrays/          the numbers of the run's state, written by Orbax (`jmorl.storage.packing`)
+arrays/          the numbers of the run's state, written by Orbax (`jmorl.storage.serialization`)
 metrics.csv      the logs as they were then: metrics.csv, policies.csv and decisions.jsonl
 checkpoint.json  one line: versions, the rest of the state, and size and SHA-256 of every other file;
                  a second line: the SHA-256 of the first
@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.storage.files import partial_path, sync
-from jmorl.storage.packing import PackedState, pack
+from jmorl.storage.serialization import PackedState, pack
 from jmorl.storage.versions import check_format
 
 FORMAT = 1

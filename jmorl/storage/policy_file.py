@@ -60,7 +60,7 @@ class StoredPolicy:
 def save_policy(
     path: Path, policy: Policy, environment: Environment[Any], config: Config, run: str | None = None
 ) -> None:
-    """Write a policy whose snapshot is a `Learner`, with where it comes from noted in the header.
+    """Write a policy whose snapshot is a `TrainState`, with where it comes from noted in the header.
 
     `run` is the id in the run's manifest, if it has one.
     """
@@ -78,7 +78,7 @@ def save_policy(
         "weights": policy.weights.tolist(),
         "values": (policy.values if policy.raw is None else policy.raw).tolist(),
         "score": policy.values.tolist(),  # other than the values only in paper units
-        "spread": policy.spread.tolist(),
+        "std": policy.std.tolist(),
         "discounted": policy.discounted.tolist(),
         "evaluation_episodes": config.evaluation.episodes,
         "discount": config.ppo.discount,

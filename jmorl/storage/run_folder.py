@@ -27,10 +27,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from envs.checks import check_environment
 from envs.core import Environment
-from envs.declared import check_environment
 from jmorl.config import Config
-from jmorl.run import Decided, Event, GenerationFinished, RunFinished
+from jmorl.events import Decided, Event, GenerationFinished, RunFinished
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
 from jmorl.storage.decision_log import DecisionLog
@@ -180,7 +180,7 @@ class RunFolder:
             "parent": policy.parent,
             **self._named("weight", policy.weights),
             **self._named("value", policy.values),
-            **self._named("spread", policy.spread),
+            **self._named("std", policy.std),
             **self._named("discounted", policy.discounted),
             **self._named("predicted", nothing if policy.predicted is None else policy.predicted),
             **self._named("raw", nothing if policy.raw is None else policy.raw),

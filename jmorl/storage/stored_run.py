@@ -109,7 +109,7 @@ def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy
         parent=int(row["parent"]) if row["parent"] else None,
         weights=vector("weight"),
         values=vector("value"),
-        spread=vector("spread"),
+        std=vector("std"),
         discounted=vector("discounted"),
         snapshot=None,
         predicted=vector_or_none("predicted"),

@@ -6,9 +6,9 @@ from nicegui import ui
 from nicegui.element import Element
 
 from jmorl.search.policy import Policy
-from jmorl.studio import words
-from jmorl.studio.desk import LETTERS
-from jmorl.studio.looks import decimals
+from jmorl.studio import texts
+from jmorl.studio.chart_style import decimals
+from jmorl.studio.selection import LETTERS
 
 if TYPE_CHECKING:
     from jmorl.studio.page import Page
@@ -32,9 +32,9 @@ class Cards:
                 self.places = {letter: ui.element("article").classes("place") for letter in LETTERS}
 
     def show(self) -> None:
-        view, desk = self.page.view, self.page.desk
+        view, selection = self.page.view, self.page.selection
         for letter, place in self.places.items():
-            policy = view.policy(desk.places[letter]) if letter in desk.places else None
+            policy = view.policy(selection.places[letter]) if letter in selection.places else None
             card = self.cards.get(letter)
             if card and (policy is None or (view.run, policy.id) != (card.run, card.policy.id)):
                 place.clear()
@@ -44,7 +44,7 @@ class Cards:
                     self.cards[letter] = Card(self.page, policy, letter)
             if policy:
                 self.cards[letter].show()
-            focused = policy is not None and policy.id == desk.focus
+            focused = policy is not None and policy.id == selection.focus
             place.classes(add="focus" if focused else None, remove=None if focused else "focus")
             place.set_visibility(policy is not None)
         self.hint.set_visibility(not self.cards)
@@ -76,22 +76,22 @@ class Card:
         player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]
         player.props["label"] = f"policy {policy.id} at work"
         with ui.element("dl").classes("scores"):
-            for score, objective in zip(words.score_of_each(view, policy), view.objectives, strict=True):
+            for score, objective in zip(texts.score_of_each(view, policy), view.objectives, strict=True):
                 with ui.element("dt"):
                     ui.label(objective.label)
                 with ui.element("dd"):
                     ui.label(score)
         if policy.raw is not None:
-            ui.label(words.raw_returns(view, policy)).classes("consequences")
+            ui.label(texts.raw_returns(view, policy)).classes("consequences")
         self.consequences = ui.label().classes("consequences")
         self.choose = ui.button(on_click=lambda: page.choose(policy.id)).props("no-caps dense").classes("choose")
 
     def show(self) -> None:
         """What depends on the question, and on the focus."""
-        view, desk = self.page.view, self.page.desk
-        focused = desk.focus == self.policy.id
-        prospect = desk.prospects.get(self.policy.id) if view.question else None
-        self.consequences.set_text(words.consequences(view, prospect, self.policy))
+        view, selection = self.page.view, self.page.selection
+        focused = selection.focus == self.policy.id
+        prospect = selection.prospects.get(self.policy.id) if view.question else None
+        self.consequences.set_text(texts.consequences(view, prospect, self.policy))
         self.choose.set_visibility(view.choosable(self.policy.id))
         final = view.question is not None and view.question.purpose == "final"
         self.choose.set_text(f"{self.letter} is the result" if final else f"Choose {self.letter}")

@@ -49,9 +49,9 @@ class Charts:
 
     def show_marks(self) -> None:
         """Only what is laid out, and what follows from it: little, however many policies there are."""
-        view, desk = self.page.view, self.page.desk
-        _draw(self.front_marks, front_marks(view, desk, self.axes, self._asked()))
-        _draw(self.parallel_marks, parallel_marks(view, desk))
+        view, selection = self.page.view, self.page.selection
+        _draw(self.front_marks, front_marks(view, selection, self.axes, self._asked()))
+        _draw(self.parallel_marks, parallel_marks(view, selection))
 
     def _asked(self) -> Any:
         dialogue = self.page.dialogue

@@ -9,9 +9,8 @@ from jmorl.decision.protocol import PointQuestion
 from jmorl.display.limits import around, core, inside
 from jmorl.display.text import plural
 from jmorl.search.bounds import within
-from jmorl.steering import Prospect
-from jmorl.studio.desk import Desk
-from jmorl.studio.looks import (
+from jmorl.state import Prospect
+from jmorl.studio.chart_style import (
     BLUE,
     GREEN,
     GREY,
@@ -25,8 +24,9 @@ from jmorl.studio.looks import (
     better,
     plain,
 )
+from jmorl.studio.selection import Selection
+from jmorl.studio.texts import wanted
 from jmorl.studio.view import View
-from jmorl.studio.words import wanted
 
 STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"
 GHOSTS = 6  # earlier fronts
@@ -54,18 +54,18 @@ def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None
     }
 
 
-def front_marks(view: View, desk: Desk, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
+def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
     """What follows from what is laid out: a chart to put over the other, so that only little is drawn anew."""
     limits = _limits(view, asked)
-    prospect = desk.prospect if view.question else None  # what is answered brings nothing any more
+    prospect = selection.prospect if view.question else None  # what is answered brings nothing any more
     bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
     return {
         **_frame(view, axes, limits, visible=False),
         "series": [
             _area("bounds that would follow", bounds, axes, limits, PROPOSED),
             _expected(prospect, axes),
-            _wanted(view, desk, axes),
-            _laid_out(view, desk, axes),
+            _wanted(view, selection, axes),
+            _laid_out(view, selection, axes),
             _points(asked, axes),
         ],
     }
@@ -207,20 +207,20 @@ def _expected(prospect: Prospect | None, axes: tuple[int, int]) -> dict[str, Any
     return _scatter("expected by the model", data, axes, silent=True, z=2, **looks)
 
 
-def _wanted(view: View, desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
+def _wanted(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
     """Rings around what has more of what there should be more of."""
-    more = set(wanted(view, desk) or ())
+    more = set(wanted(view, selection) or ())
     data = [[policy.id, *plain(policy.values)[0], ""] for policy in view.front if policy.id in more]
     look = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
     return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=look, z=6)
 
 
-def _laid_out(view: View, desk: Desk, axes: tuple[int, int]) -> dict[str, Any]:
+def _laid_out(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
     data = []
-    for policy_id, letter in desk.letters.items():
+    for policy_id, letter in selection.letters.items():
         policy = view.policy(policy_id)
         if policy:
-            focused = policy_id == desk.focus
+            focused = policy_id == selection.focus
             data.append(
                 {
                     "value": [policy_id, *plain(policy.values)[0], ""],

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from jmorl.decision.records import DecisionRecord
 from jmorl.display.text import plural, values_in_words
-from jmorl.studio import words
+from jmorl.studio import texts
 from jmorl.studio.history import Branch
 from jmorl.studio.view import View
 
@@ -76,7 +76,7 @@ class HistoryPanel:
 
     def _values(self, values: Sequence[float]) -> str:
         view = self.page.view
-        return words.minus(values_in_words(values, view.objectives, words.formats_of(view)))
+        return texts.minus(values_in_words(values, view.objectives, texts.formats_of(view)))
 
 
 def _open_question(view: View) -> str:

@@ -9,7 +9,7 @@ from jmorl.decision.enautilus import IntermediatePoint
 from jmorl.decision.protocol import Adjust, Back, Choose, PointAnswer, PointQuestion
 from jmorl.display.text import objective_label, plural
 from jmorl.search.scaling import range_scale
-from jmorl.studio import words
+from jmorl.studio import texts
 from jmorl.studio.dialogue import Dialogue
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class NavigationPanel:
             ui.button("Close", on_click=self._close).props("no-caps dense flat")
 
     def _add_point(self, dialogue: Dialogue, question: PointQuestion, number: int, point: IntermediatePoint) -> None:
-        scale, formats = range_scale(question.state.values), words.formats_of(self.page.view)
+        scale, formats = range_scale(question.state.values), texts.formats_of(self.page.view)
         worst, best = scale.apply(point.value), scale.apply(point.best)
         with ui.element("div").classes("point"):
             ui.label(str(number)).classes("point-number")
@@ -84,7 +84,7 @@ class NavigationPanel:
                     with ui.element("div").classes("range").props('aria-hidden="true"'):
                         width = max(100 * (best[index] - worst[index]), 1.5)
                         ui.element("div").style(f"left: {100 * worst[index]:.1f}%; width: {width:.1f}%")
-                    ui.label(words.minus(f"{point.value[index]:{fmt}} to {point.best[index]:{fmt}}"))
+                    ui.label(texts.minus(f"{point.value[index]:{fmt}} to {point.best[index]:{fmt}}"))
             with ui.element("div").classes("point-side"):
                 ui.label(f"{point.closeness:.0f} % of the way")
                 ui.label(f"{plural(int(point.reachable.sum()), 'policy')} left")
@@ -94,7 +94,7 @@ class NavigationPanel:
     def _add_end(self, dialogue: Dialogue) -> None:
         chosen = dialogue.chosen
         assert chosen
-        ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {words.scores(self.page.view, chosen)}.").classes("ending")
+        ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {texts.scores(self.page.view, chosen)}.").classes("ending")
         if self.page.view.choosable(chosen.id):
             ui.label("It is laid out below, where you can choose it.").classes("explanation")
         with ui.element("div").classes("controls"):

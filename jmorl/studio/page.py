@@ -12,11 +12,11 @@ from nicegui.events import KeyEventArguments
 from jmorl.decision.protocol import Answer, Question
 from jmorl.display.text import objective_label
 from jmorl.storage.checkpoints import CheckpointError
-from jmorl.studio import words
+from jmorl.studio import texts
 from jmorl.studio.cards import Cards
+from jmorl.studio.chart_style import BLUE, RED
 from jmorl.studio.charts import Charts
 from jmorl.studio.history_panel import HistoryPanel
-from jmorl.studio.looks import BLUE, RED
 from jmorl.studio.navigation_panel import NavigationPanel
 from jmorl.studio.policies import PolicyTable
 from jmorl.studio.question_bar import QuestionBar
@@ -32,7 +32,7 @@ class Page:
 
     def __init__(self, session: Session):
         self.session = session
-        self.view, self.desk, self.dialogue = session.view, session.desk, session.dialogue
+        self.view, self.selection, self.dialogue = session.view, session.selection, session.dialogue
         self.settled: Question | None = None  # answered, and whoever sits at this tab knows
         ui.add_css(STYLE)
         ui.colors(primary=BLUE, negative=RED)
@@ -50,12 +50,16 @@ class Page:
 
     def refresh(self) -> None:
         """Bring up to date what is not."""
-        view, desk, dialogue = self.session.view, self.session.desk, self.session.dialogue
+        view, selection, dialogue = self.session.view, self.session.selection, self.session.dialogue
         other_run = view.path != self.view.path
         if not other_run and len(view.choices) > len(self.view.choices):
             self._tell_of_answer(self.view.question, view)
-        new_view, new_desk, new_dialogue = view is not self.view, desk is not self.desk, dialogue is not self.dialogue
-        self.view, self.desk, self.dialogue = view, desk, dialogue
+        new_view, new_desk, new_dialogue = (
+            view is not self.view,
+            selection is not self.selection,
+            dialogue is not self.dialogue,
+        )
+        self.view, self.selection, self.dialogue = view, selection, dialogue
         if other_run:
             self._show_all()
             return
@@ -106,7 +110,7 @@ class Page:
 
     def more_of(self, objective: int) -> None:
         """More of an objective, or, asked for again, all policies."""
-        self.session.more_of(None if self.desk.more_of == objective else objective)
+        self.session.more_of(None if self.selection.more_of == objective else objective)
         self.refresh()
 
     async def step_back(self, run_id: str, generation: int) -> None:
@@ -172,16 +176,16 @@ class Page:
         view, now = self.view, self.session.clock()
         self.next_tick = now + TICK_SECONDS
         self.run_name.set_text(f"{view.path.name} · {view.config.env}")
-        self.phase.set_text(words.phase(view, now, self.session.leaving))
-        self.facts.set_text(words.facts(view, now))
-        self.meter.style(f"width: {100 * words.share_done(view, now):.1f}%")
+        self.phase.set_text(texts.phase(view, now, self.session.leaving))
+        self.facts.set_text(texts.facts(view, now))
+        self.meter.style(f"width: {100 * texts.share_done(view, now):.1f}%")
 
     def _add_keys(self) -> None:
         ui.keyboard(self._press, ignore=["input", "select", "textarea"], repeating=True)
         with ui.dialog() as self.keys, ui.card():
             ui.label("Keys").classes("title")
             with ui.element("dl").classes("keys"):
-                for key, what in words.KEYS:
+                for key, what in texts.KEYS:
                     with ui.element("dt"):
                         ui.label(key)
                     with ui.element("dd"):
@@ -197,7 +201,7 @@ class Page:
         modified = event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta
         if not event.action.keydown or modified or self.keys.value or self.question_bar.stopping.value:
             return
-        key, focus = event.key, self.desk.focus
+        key, focus = event.key, self.selection.focus
         if key.arrow_left or key.arrow_right:
             self._look_along(1 if key.arrow_right else -1)
         elif event.action.repeat:  # a key that is held down answers once
@@ -215,9 +219,9 @@ class Page:
 
     def _look_along(self, step: int) -> None:
         """Look at the next policy of those shown, in the order of the first objective in the chart."""
-        wanted = words.wanted(self.view, self.desk)
+        wanted = texts.wanted(self.view, self.selection)
         shown = [policy for policy in self.view.front if wanted is None or policy.id in wanted]
         order = [policy.id for policy in sorted(shown, key=lambda policy: float(policy.values[self.charts.axes[0]]))]
         if order:
-            place = order.index(self.desk.focus) + step if self.desk.focus in order else 0
+            place = order.index(self.selection.focus) + step if self.selection.focus in order else 0
             self.look_at(order[min(max(place, 0), len(order) - 1)])

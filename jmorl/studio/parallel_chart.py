@@ -8,8 +8,8 @@ import numpy as np
 from jmorl.display.limits import around
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
-from jmorl.studio.desk import Desk
-from jmorl.studio.looks import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
+from jmorl.studio.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
+from jmorl.studio.selection import Selection
 from jmorl.studio.view import View
 
 
@@ -26,18 +26,18 @@ def parallel_options(view: View) -> dict[str, Any]:
     }
 
 
-def parallel_marks(view: View, desk: Desk) -> dict[str, Any]:
+def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
     """The lines of what is laid out: a chart to put over the other."""
     lines = [
         {
             "value": [*plain(policy.values)[0], policy.id],
             "lineStyle": {
                 "color": LETTER_COLOURS[letter],
-                "width": 4 if policy.id == desk.focus else 2.5,
+                "width": 4 if policy.id == selection.focus else 2.5,
                 "opacity": 1,
             },
         }
-        for policy_id, letter in desk.letters.items()
+        for policy_id, letter in selection.letters.items()
         if (policy := view.policy(policy_id))
     ]
     series = {"type": "parallel", "id": "laid out", "name": "laid out", "data": lines, "silent": True}

@@ -6,8 +6,8 @@ from nicegui.element import Element
 
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
-from jmorl.studio import words
-from jmorl.studio.looks import decimals, plain
+from jmorl.studio import texts
+from jmorl.studio.chart_style import decimals, plain
 
 if TYPE_CHECKING:
     from jmorl.studio.page import Page
@@ -36,10 +36,10 @@ class PolicyTable:
 
     def show_marks(self) -> None:
         """Send which rows are laid out, and which are left by what there should be more of."""
-        desk = self.page.desk
-        by = None if desk.more_of is None or desk.more_of == self.by else desk.more_of + 1
-        self.by = desk.more_of
-        self.grid.run_method("lay_out", desk.letters, desk.focus, words.wanted(self.page.view, desk), by)
+        selection = self.page.selection
+        by = None if selection.more_of is None or selection.more_of == self.by else selection.more_of + 1
+        self.by = selection.more_of
+        self.grid.run_method("lay_out", selection.letters, selection.focus, texts.wanted(self.page.view, selection), by)
 
     def _columns(self) -> list[dict[str, Any]]:
         view = self.page.view
@@ -50,7 +50,7 @@ class PolicyTable:
                 "label": objective.label,
                 "hint": f"{objective_label(objective)}, mean and standard deviation over the evaluation episodes",
                 "decimals": 2 if places is None else places,
-                "spread": index + count + 3,
+                "std": index + count + 3,
             }
             for index, (objective, places) in enumerate(zip(view.objectives, digits, strict=True))
         ]
@@ -64,6 +64,6 @@ class PolicyTable:
         view = self.page.view
         inside = within(view.values, view.bounds)
         return [
-            [policy.id, not kept, *values, policy.generation, *plain(policy.spread)[0]]
+            [policy.id, not kept, *values, policy.generation, *plain(policy.std)[0]]
             for policy, kept, values in zip(view.front, inside.tolist(), plain(view.values), strict=True)
         ]

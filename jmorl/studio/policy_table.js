@@ -49,10 +49,10 @@ export default {
   methods: {
     value: (row, column) => (column ? row[column + 1] : row[0]),
     text(row, index) {
-      const { decimals, spread } = this.columns[index];
+      const { decimals, std } = this.columns[index];
       if (decimals === undefined) return String(this.value(row, index));
       const value = this.value(row, index).toFixed(decimals).replace("-", "−");
-      return spread === undefined ? value : `${value} ±${row[spread].toFixed(decimals)}`;
+      return std === undefined ? value : `${value} ±${row[std].toFixed(decimals)}`;
     },
     classes(row) {
       return { "policies-row": true, outside: row[1], focus: row[0] === this.focus };

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from jmorl.decision.protocol import Answer, Question
-from jmorl.studio import words
+from jmorl.studio import texts
 
 if TYPE_CHECKING:
     from jmorl.studio.page import Page
@@ -30,13 +30,13 @@ class QuestionBar:
                 ui.button("Go on", on_click=self.stopping.close).props("flat no-caps")
 
     def show(self) -> None:
-        view, desk = self.page.view, self.page.desk
-        self.heading.set_text(words.heading(view, desk))
+        view, selection = self.page.view, self.page.selection
+        self.heading.set_text(texts.heading(view, selection))
         if view.question is not self.question:
             self.question = view.question
             self.generations = 1  # of silence, anew for each question
             self.stopping.close()
-        shown = id(view.question), id(view.result), view.timeline is None, bool(view.front), desk.more_of, view.run
+        shown = id(view.question), id(view.result), view.timeline is None, bool(view.front), selection.more_of, view.run
         if shown == self.shown:  # nobody shall lose a button that they are about to press
             return
         self.shown = shown
@@ -59,7 +59,7 @@ class QuestionBar:
     def _add_more(self) -> None:
         ui.label("Better in")
         for index, objective in enumerate(self.page.view.objectives):
-            pressed = self.page.desk.more_of == index
+            pressed = self.page.selection.more_of == index
             button = ui.button(objective.label, on_click=lambda index=index: self.page.more_of(index))
             button.props(f"no-caps dense {'unelevated' if pressed else 'outline'} aria-pressed={str(pressed).lower()}")
 
@@ -93,7 +93,7 @@ class QuestionBar:
     def _candidate(self) -> int | None:
         """The policy that a stop would end with."""
         previous = self.page.view.previous
-        return self.page.desk.focus if self.page.desk.focus is not None else previous.id if previous else None
+        return self.page.selection.focus if self.page.selection.focus is not None else previous.id if previous else None
 
     def _ask_to_stop(self) -> None:
         policy = self._candidate()

@@ -1,6 +1,6 @@
 """A run beside a page: driven in a thread of its own, shown as immutable records, steered by commands.
 
-The run never waits for anybody but the person who is asked. Whoever shows it reads `view`, `desk` and `dialogue`,
+The run never waits for anybody but the person who is asked. Whoever shows it reads `view`, `selection` and `dialogue`,
 each replaced as a whole, and compares them by identity with what was shown last. Some commands wait for the generation
 that is going on, and say so.
 """
@@ -15,18 +15,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from jmorl.decision.protocol import Answer, PointAnswer, Question
+from jmorl.events import RunFinished
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
-from jmorl.run import RunFinished
-from jmorl.steering import RunState, prospect
+from jmorl.state import RunState, prospect
 from jmorl.storage.afterwards import keep_dialogue
-from jmorl.storage.continuing import AlreadyFinished, Continued, branch, resume
+from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
-from jmorl.studio.desk import Desk
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.history import Branch, free_folder, read_tree
 from jmorl.studio.person import LeftOff, Person
+from jmorl.studio.selection import Selection
 from jmorl.studio.view import PERSON, View, after, stored_view
 
 
@@ -37,10 +37,10 @@ class Session:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         self.clock = clock
-        self.desk = Desk()
+        self.selection = Selection()
         self.dialogue: Dialogue | None = None
         self.leaving = False  # the run is about to be left, after its generation
-        self._lock = threading.Lock()  # of the desk, which a thread adds to
+        self._lock = threading.Lock()  # of the selection, which a thread adds to
         self._moving = threading.Lock()  # while one run is left for another
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
@@ -71,17 +71,17 @@ class Session:
     def look_at(self, policy: int) -> None:
         """Lay a policy out and put it in focus; nothing if there is none."""
         if self.view.policy(policy):
-            self._rearrange(lambda desk: desk.with_policy(policy))
+            self._rearrange(lambda selection: selection.with_policy(policy))
             self._think(self.view.question, policy)
 
     def put_away(self, policy: int) -> None:
-        self._rearrange(lambda desk: desk.without(policy))
+        self._rearrange(lambda selection: selection.without(policy))
 
     def more_of(self, objective: int | None) -> None:
         """Ask for more of an objective than the policy in focus, or else the last choice, has; None: no longer."""
         previous = self.view.previous.id if self.view.previous else None
-        than = self.desk.focus if self.desk.focus is not None else previous
-        self._rearrange(lambda desk: replace(desk, more_of=objective, than=than))
+        than = self.selection.focus if self.selection.focus is not None else previous
+        self._rearrange(lambda selection: replace(selection, more_of=objective, than=than))
 
     def history(self) -> tuple[Branch, ...]:
         """The run that is open among its branches."""
@@ -182,8 +182,8 @@ class Session:
     def _asked(self, question: Question) -> None:
         """A question is open: what is laid out is seen in its light."""
         self.view = replace(self.view, question=question, bounds=question.bounds)
-        self._rearrange(lambda desk: replace(desk, prospects={}))
-        for policy in self.desk.letters:
+        self._rearrange(lambda selection: replace(selection, prospects={}))
+        for policy in self.selection.letters:
             if self.view.policy(policy):
                 self._think(question, policy)
             else:
@@ -192,14 +192,14 @@ class Session:
     def _show(self, path: Path) -> None:
         """Show what the folder has; of a run that has ended, its result is laid out."""
         self.view = stored_view(path)
-        self.desk, self.dialogue = Desk(), None
+        self.selection, self.dialogue = Selection(), None
         if self.view.result:
             self.look_at(self.view.result.id)
 
     def _think(self, question: Question | None, policy: int) -> None:
         """Find out in the background what choosing the policy would mean."""
         state = self.view.state
-        if question and question.purpose == "steer" and state and policy not in self.desk.prospects:
+        if question and question.purpose == "steer" and state and policy not in self.selection.prospects:
             self._thinking.submit(self._note_prospect, question, state, policy)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
@@ -208,11 +208,11 @@ class Session:
         except ValueError:  # a policy that is looked at, but not to choose from
             return
         if self.view.question is question:
-            self._rearrange(lambda desk: replace(desk, prospects={**desk.prospects, policy: found}))
+            self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: found}))
 
-    def _rearrange(self, change: Callable[[Desk], Desk]) -> None:
+    def _rearrange(self, change: Callable[[Selection], Selection]) -> None:
         with self._lock:
-            self.desk = change(self.desk)
+            self.selection = change(self.selection)
 
     def _move_to(self, dialogue: Dialogue) -> None:
         """Show a dialogue when all that is shown of it is known; at its end keep it, and look at what it led to."""

@@ -13,11 +13,11 @@ from envs.core import Objective
 from jmorl.config import Config, resolve
 from jmorl.decision.protocol import Question
 from jmorl.display.text import REASONS
+from jmorl.events import Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
-from jmorl.run import Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.search.archive import Archive
 from jmorl.search.policy import Policy, values_of
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.storage.manifest import read_manifest
 from jmorl.storage.stored_run import StoredRun, read_run
 from jmorl.units import measured_in

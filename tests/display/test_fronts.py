@@ -14,9 +14,9 @@ OBJECTIVES = (Objective("time", "time", "-steps"), Objective("fuel", "fuel", "-l
 VALUES = np.array([[-70.0, -40.0], [-66.25, -57.0], [-100.0, -20.0]])
 
 
-def policies(values, spread=0.5):
+def policies(values, std=0.5):
     return [
-        Policy(10 + index, index, None, np.array([0.3, 0.7]), value, np.full(2, spread), value, None)
+        Policy(10 + index, index, None, np.array([0.3, 0.7]), value, np.full(2, std), value, None)
         for index, value in enumerate(np.asarray(values, float))
     ]
 

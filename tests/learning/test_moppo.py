@@ -18,21 +18,21 @@ QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rat
 
 def learned(environment, weights=(0.5, 0.5), iterations=40, **settings):
     moppo = MOPPO(environment, PPOConfig(**{**QUICK, **settings}))
-    start = moppo.initial_learner(jax.random.key(0))
+    start = moppo.initial_train_state(jax.random.key(0))
     schedule = Schedule(iterations, moppo.config.learning_rate)
-    learner, _ = jax.jit(moppo.train)(start, jnp.array(weights), jax.random.key(1), schedule)
-    return moppo, learner
+    train_state, _ = jax.jit(moppo.train)(start, jnp.array(weights), jax.random.key(1), schedule)
+    return moppo, train_state
 
 
-def scaled_values(moppo, learner, observations):
+def scaled_values(moppo, train_state, observations):
     """The critic's values in reward-scaled units."""
-    x = normalize(learner.observation_statistics, jnp.asarray(observations)[:, None])
-    return moppo.critic.apply(learner.parameters["critic"], x)
+    x = normalize(train_state.observation_statistics, jnp.asarray(observations)[:, None])
+    return moppo.critic.apply(train_state.parameters["critic"], x)
 
 
-def values(moppo, learner, observations):
+def values(moppo, train_state, observations):
     """The critic's values in raw units."""
-    return scaled_values(moppo, learner, observations) * return_scale(learner.return_statistics)
+    return scaled_values(moppo, train_state, observations) * return_scale(train_state.return_statistics)
 
 
 @pytest.mark.parametrize("size", [1, 2, 5, 4000])
@@ -81,21 +81,23 @@ def test_discounted_sums_equal_a_loop():
 def test_rollouts_continue_across_iterations():
     """Endless episodes of ten steps, seven in a rollout: the second one starts where the first one stopped."""
     moppo = MOPPO(Follow(), PPOConfig(environments=2, rollout_steps=7, minibatches=1))
-    learner = moppo.initial_learner(jax.random.key(0))
-    workers = moppo.start_workers(jax.random.key(1))
-    after, trajectory, _ = moppo.collect(learner, workers, jax.random.key(2))
-    np.testing.assert_array_equal(trajectory.observation[:, 0], workers.observations)
-    _, following, _ = moppo.collect(learner, after, jax.random.key(3))
+    train_state = moppo.initial_train_state(jax.random.key(0))
+    rollout_state = moppo.initial_rollout_state(jax.random.key(1))
+    after, trajectory, _ = moppo.collect(train_state, rollout_state, jax.random.key(2))
+    np.testing.assert_array_equal(trajectory.observation[:, 0], rollout_state.observations)
+    _, following, _ = moppo.collect(train_state, after, jax.random.key(3))
     np.testing.assert_array_equal(following.observation[:, 0], after.observations)
 
 
 def test_log_probability_is_of_the_unclipped_action_under_the_policy_that_acted():
     moppo = MOPPO(ThreeWays(), PPOConfig(environments=2, rollout_steps=50, minibatches=1))
-    learner = moppo.initial_learner(jax.random.key(0))
-    _, trajectory, statistics = moppo.collect(learner, moppo.start_workers(jax.random.key(1)), jax.random.key(2))
-    batch = moppo.batch(learner, trajectory, jnp.sqrt(statistics.variance), jnp.ones(3) / 3)
+    train_state = moppo.initial_train_state(jax.random.key(0))
+    _, trajectory, statistics = moppo.collect(
+        train_state, moppo.initial_rollout_state(jax.random.key(1)), jax.random.key(2)
+    )
+    batch = moppo.batch(train_state, trajectory, jnp.sqrt(statistics.variance), jnp.ones(3) / 3)
     assert (jnp.abs(trajectory.action) > 1).any()
-    mean, log_std = jax.vmap(jax.vmap(moppo.policy(learner)), in_axes=0)(trajectory.observation)
+    mean, log_std = jax.vmap(jax.vmap(moppo.policy(train_state)), in_axes=0)(trajectory.observation)
     z = (trajectory.action - mean) / jnp.exp(log_std)
     expected = (-0.5 * z**2 - log_std - 0.5 * jnp.log(2 * jnp.pi)).sum(-1).reshape(-1)
     np.testing.assert_allclose(batch.log_probability, expected, rtol=1e-5, atol=1e-5)
@@ -105,11 +107,11 @@ def test_weights_on_raw_objectives_are_weights_on_scaled_ones_times_the_scale():
     scale, weights = jnp.array([1.0, 4.0, 0.5]), jnp.array([0.2, 0.3, 0.5])
     raw = MOPPO(ThreeWays(), PPOConfig(environments=2, rollout_steps=20, minibatches=1, weights_on="raw"))
     scaled = MOPPO(ThreeWays(), PPOConfig(environments=2, rollout_steps=20, minibatches=1, weights_on="scaled"))
-    learner = raw.initial_learner(jax.random.key(0))
-    _, trajectory, _ = raw.collect(learner, raw.start_workers(jax.random.key(1)), jax.random.key(2))
+    train_state = raw.initial_train_state(jax.random.key(0))
+    _, trajectory, _ = raw.collect(train_state, raw.initial_rollout_state(jax.random.key(1)), jax.random.key(2))
     np.testing.assert_allclose(
-        raw.batch(learner, trajectory, scale, weights).advantage,
-        scaled.batch(learner, trajectory, scale, weights * scale).advantage,
+        raw.batch(train_state, trajectory, scale, weights).advantage,
+        scaled.batch(train_state, trajectory, scale, weights * scale).advantage,
         rtol=1e-5,
         atol=1e-6,
     )
@@ -122,10 +124,10 @@ def test_a_truncated_step_is_bootstrapped_from_where_its_episode_ended():
 
     @jax.jit
     def one_batch(key):
-        learner = moppo.initial_learner(key)
-        _, trajectory, _ = moppo.collect(learner, moppo.start_workers(key), key)
-        batch = moppo.batch(learner, trajectory, jnp.ones(2), jnp.array([1.0, 0.0]))
-        return trajectory, batch.advantage[:25], scaled_values(moppo, learner, jnp.arange(11.0))[:, 0]
+        train_state = moppo.initial_train_state(key)
+        _, trajectory, _ = moppo.collect(train_state, moppo.initial_rollout_state(key), key)
+        batch = moppo.batch(train_state, trajectory, jnp.ones(2), jnp.array([1.0, 0.0]))
+        return trajectory, batch.advantage[:25], scaled_values(moppo, train_state, jnp.arange(11.0))[:, 0]
 
     trajectory, advantage, value = one_batch(jax.random.key(0))
     steps = np.arange(25) % 10
@@ -136,33 +138,33 @@ def test_a_truncated_step_is_bootstrapped_from_where_its_episode_ended():
 
 
 def test_the_critic_learns_one_value_for_each_objective():
-    moppo, learner = learned(OneStep())
-    np.testing.assert_allclose(values(moppo, learner, [0.0])[0], [1.0, -2.0], rtol=0.05)
+    moppo, train_state = learned(OneStep())
+    np.testing.assert_allclose(values(moppo, train_state, [0.0])[0], [1.0, -2.0], rtol=0.05)
 
 
 def test_a_later_reward_is_discounted():
-    moppo, learner = learned(TwoSteps())
-    np.testing.assert_allclose(values(moppo, learner, [0.0])[0], [0.9, -1.8], rtol=0.05)
-    np.testing.assert_allclose(values(moppo, learner, [1.0])[0], [1.0, -2.0], rtol=0.05)
+    moppo, train_state = learned(TwoSteps())
+    np.testing.assert_allclose(values(moppo, train_state, [0.0])[0], [0.9, -1.8], rtol=0.05)
+    np.testing.assert_allclose(values(moppo, train_state, [1.0])[0], [1.0, -2.0], rtol=0.05)
 
 
 def test_a_time_limit_is_not_an_end():
     """Bootstrapped across the limit the value is 1 / (1 - 0.9) = 10; treated as an end it would be below 7."""
-    moppo, learner = learned(Endless(), iterations=150)
-    np.testing.assert_allclose(values(moppo, learner, [0.0])[0], [10.0, -20.0], rtol=0.1)
+    moppo, train_state = learned(Endless(), iterations=150)
+    np.testing.assert_allclose(values(moppo, train_state, [0.0])[0], [10.0, -20.0], rtol=0.1)
 
 
 @pytest.mark.parametrize(("weights", "action"), [((1.0, 0.0), -0.8), ((0.25, 0.75), 0.4), ((0.0, 1.0), 0.8)])
 def test_the_weights_decide_what_is_learned(weights, action):
-    moppo, learner = learned(Compromise(), weights, weights_on="raw", initial_log_std=-1.0)
-    mean, _ = moppo.policy(learner)(jnp.zeros(1))
+    moppo, train_state = learned(Compromise(), weights, weights_on="raw", initial_log_std=-1.0)
+    mean, _ = moppo.policy(train_state)(jnp.zeros(1))
     np.testing.assert_allclose(mean, [action], atol=0.1)
 
 
 def test_the_policy_depends_on_the_observation():
-    moppo, learner = learned(Follow(), initial_log_std=-1.0, iterations=60)
+    moppo, train_state = learned(Follow(), initial_log_std=-1.0, iterations=60)
     observations = jnp.linspace(-0.9, 0.9, 7)[:, None]
-    mean, _ = jax.vmap(moppo.policy(learner))(observations)
+    mean, _ = jax.vmap(moppo.policy(train_state))(observations)
     np.testing.assert_allclose(mean, observations, atol=0.2)
 
 
@@ -174,19 +176,19 @@ def test_the_bound_loss_is_the_squared_distance_from_the_box():
 @pytest.mark.parametrize(("coefficient", "returns"), [(0.0, False), (1.0, True)])
 def test_only_the_bound_loss_brings_back_a_mean_far_outside_the_box(coefficient, returns):
     moppo = MOPPO(Clipped(), PPOConfig(**QUICK, initial_log_std=-1.0, action_bound_coefficient=coefficient))
-    learner = moppo.initial_learner(jax.random.key(0))
-    learner.parameters["actor"]["params"]["MLP_0"]["Dense_2"]["bias"] += 3.0
+    train_state = moppo.initial_train_state(jax.random.key(0))
+    train_state.parameters["actor"]["params"]["MLP_0"]["Dense_2"]["bias"] += 3.0
     schedule = Schedule(40, moppo.config.learning_rate)
-    learner, _ = jax.jit(moppo.train)(learner, jnp.array([0.5, 0.5]), jax.random.key(1), schedule)
-    mean, _ = moppo.policy(learner)(jnp.zeros(1))
+    train_state, _ = jax.jit(moppo.train)(train_state, jnp.array([0.5, 0.5]), jax.random.key(1), schedule)
+    mean, _ = moppo.policy(train_state)(jnp.zeros(1))
     assert (mean[0] == pytest.approx(0.5, abs=0.1)) if returns else (mean[0] > 1.5)
 
 
 def test_evaluation_counts_an_episode_once_to_its_end():
-    moppo, learner = learned(TwoSteps(), iterations=1)
-    returns = moppo.evaluate(learner, jax.random.split(jax.random.key(0), 3))
+    moppo, train_state = learned(TwoSteps(), iterations=1)
+    returns = moppo.evaluate(train_state, jax.random.split(jax.random.key(0), 3))
     np.testing.assert_array_equal(returns.undiscounted, np.tile([1.0, -2.0], (3, 1)))
     np.testing.assert_allclose(returns.discounted, np.tile([0.9, -1.8], (3, 1)), rtol=1e-6)
     np.testing.assert_array_equal(returns.length, [2, 2, 2])
-    endless = MOPPO(Endless(), PPOConfig(**QUICK)).evaluate(learner, jax.random.split(jax.random.key(0), 3))
+    endless = MOPPO(Endless(), PPOConfig(**QUICK)).evaluate(train_state, jax.random.split(jax.random.key(0), 3))
     np.testing.assert_array_equal(endless.length, [10, 10, 10])

@@ -17,12 +17,12 @@ GENERATIONS = (1, 3, 2)  # of three runs that share a program: two leave before 
 def generations(population, seed, count, iterations=1, weights=WEIGHTS):
     """What a run does: train, evaluate, and again."""
     key = jax.random.key(seed)
-    learners = population.initialize(key)
+    train_states = population.initialize(key)
     for generation in range(count):
         training_key = jax.random.fold_in(key, generation)
-        learners, diagnostics = population.train(learners, weights, training_key, iterations, RATE)
-        returns = population.evaluate(learners, jax.random.split(jax.random.fold_in(key, 99), 2))
-    return learners, diagnostics, returns
+        train_states, diagnostics = population.train(train_states, weights, training_key, iterations, RATE)
+        returns = population.evaluate(train_states, jax.random.split(jax.random.fold_in(key, 99), 2))
+    return train_states, diagnostics, returns
 
 
 def side_by_side(stack, run, count):
@@ -76,9 +76,9 @@ def calls(stack, monkeypatch):
 
 def test_a_run_in_a_stack_finds_what_it_finds_alone(stack, alone):
     found = side_by_side(stack, lambda population, number: generations(population, number, GENERATIONS[number]), 3)
-    for number, (learners, diagnostics, returns) in enumerate(found):
+    for number, (train_states, diagnostics, returns) in enumerate(found):
         expected = generations(alone, number, GENERATIONS[number])
-        assert_close(learners, expected[0])
+        assert_close(train_states, expected[0])
         assert_close(diagnostics, expected[1], 1e-4)
         assert_close(returns, expected[2], 1e-4)
 
@@ -92,8 +92,8 @@ def test_calls_that_are_alike_are_one_call_for_those_runs_that_are_left(stack, c
 def test_calls_of_other_schedules_are_made_apart(stack, alone, calls):
     found = side_by_side(stack, lambda population, number: generations(population, number, 1, iterations=1 + number), 2)
     assert calls == [("train", 4), ("train", 4), ("evaluate", 8)]
-    for number, (learners, *_) in enumerate(found):
-        assert_close(learners, generations(alone, number, 1, iterations=1 + number)[0])
+    for number, (train_states, *_) in enumerate(found):
+        assert_close(train_states, generations(alone, number, 1, iterations=1 + number)[0])
 
 
 def test_a_fault_ends_only_its_own_run(stack, alone):

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from jmorl.cli import main
+from jmorl.events import GenerationFinished
 from jmorl.learning.population import Population, TrainingFault
 from jmorl.paper.plan import ITEMS, Plan
 from jmorl.paper.record import read_record
 from jmorl.paper.runner import Places, groups, make, missing
-from jmorl.run import GenerationFinished
 
 CAR_ITEMS = "table1,fig5,fig6,fig9,fig10"
 

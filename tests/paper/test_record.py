@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import envs
+from jmorl.events import GenerationFinished
 from jmorl.paper.record import (
     RecordError,
     broken_record,
@@ -16,8 +17,7 @@ from jmorl.paper.record import (
     record_of,
     write_record,
 )
-from jmorl.run import GenerationFinished
-from jmorl.storage.continuing import Continued
+from jmorl.storage.resume import Continued
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 

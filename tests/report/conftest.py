@@ -10,14 +10,14 @@ from envs.core import Objective
 from jmorl.config import resolve
 from jmorl.decision.protocol import Answer, Question
 from jmorl.decision.records import decision_record
-from jmorl.run import Compiled, Decided, Event, GenerationFinished, RunFinished, Seconds
+from jmorl.events import Compiled, Decided, Event, GenerationFinished, RunFinished, Seconds
 from jmorl.search.bounds import lower_bounds
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.metrics import PredictionMetrics, UtilityMetrics, front_metrics
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Records
 from jmorl.search.weights import simplex_grid
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.storage.stored_run import StoredRun
 
 OBJECTIVES = (
@@ -110,7 +110,7 @@ def _policy(generator: np.random.Generator, number: int, generation: int, object
         parent=max(number - AGENTS, 0) if generation else None,
         weights=weights,
         values=values,
-        spread=0.01 * np.abs(values),
+        std=0.01 * np.abs(values),
         discounted=0.5 * values,
         snapshot=None,
         predicted=values + generator.normal(0, 0.05, objectives) * scales if generation else None,

@@ -11,7 +11,7 @@ from matplotlib.image import imread
 
 from jmorl.display.limits import inside
 from jmorl.report.front_plot import choices_of, close_view, front_figure, whole_view
-from jmorl.report.many_plot import parallel_figure
+from jmorl.report.parallel_coordinates import parallel_figure
 from jmorl.report.plots import draw_run
 from jmorl.report.run_plots import prediction_figure, progress_figure
 from jmorl.report.style import RED, style

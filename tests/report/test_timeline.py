@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jmorl.config import resolve
+from jmorl.events import Resumed
 from jmorl.report.timeline import Timeline
-from jmorl.run import Resumed
 
 
 def config_of(**changes):

@@ -10,9 +10,9 @@ import pytest
 from rich.console import Console
 
 from jmorl.config import resolve
+from jmorl.events import GenerationFinished, Resumed
 from jmorl.report.live import REFRESH_RATE, LiveView
 from jmorl.report.progress import watcher
-from jmorl.run import GenerationFinished, Resumed
 from tests.report.conftest import OBJECTIVES
 
 

@@ -6,7 +6,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from jmorl.search.weights import simplex_grid, spread_weights
+from jmorl.search.weights import evenly_spaced_weights, simplex_grid
 
 
 @pytest.mark.parametrize(("objectives", "divisions"), [(1, 4), (2, 10), (3, 4), (4, 3), (5, 2)])
@@ -20,7 +20,7 @@ def test_grid_is_all_multiples_in_order(objectives: int, divisions: int) -> None
 @pytest.mark.parametrize("objectives", [2, 3, 4, 6])
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 6, 12, 40])
 def test_spread_weights_are_different_and_on_the_simplex(objectives: int, count: int) -> None:
-    weights = spread_weights(objectives, count)
+    weights = evenly_spaced_weights(objectives, count)
     assert weights.shape == (count, objectives)
     assert (weights >= 0).all()
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-14)
@@ -28,23 +28,23 @@ def test_spread_weights_are_different_and_on_the_simplex(objectives: int, count:
 
 
 def test_two_objectives_are_equal_steps_from_end_to_end() -> None:
-    np.testing.assert_allclose(spread_weights(2, 6)[:, 0], np.linspace(0, 1, 6), rtol=1e-15)
+    np.testing.assert_allclose(evenly_spaced_weights(2, 6)[:, 0], np.linspace(0, 1, 6), rtol=1e-15)
 
 
 @pytest.mark.parametrize("objectives", [1, 2, 3, 5])
 def test_one_weight_is_equal(objectives: int) -> None:
-    np.testing.assert_array_equal(spread_weights(objectives, 1), np.full((1, objectives), 1 / objectives))
+    np.testing.assert_array_equal(evenly_spaced_weights(objectives, 1), np.full((1, objectives), 1 / objectives))
 
 
 def test_more_objectives_start_with_the_corners_and_the_centre() -> None:
-    np.testing.assert_array_equal(spread_weights(4, 2), np.eye(4)[:2])
-    np.testing.assert_allclose(spread_weights(3, 4), [*np.eye(3), np.full(3, 1 / 3)])
+    np.testing.assert_array_equal(evenly_spaced_weights(4, 2), np.eye(4)[:2])
+    np.testing.assert_allclose(evenly_spaced_weights(3, 4), [*np.eye(3), np.full(3, 1 / 3)])
 
 
 @pytest.mark.parametrize(("objectives", "count"), [(3, 6), (3, 20), (4, 12)])
 def test_no_direction_is_left_out(objectives: int, count: int) -> None:
     """The farthest-point rule: no weight is farther from the chosen than the chosen are from each other."""
-    weights = spread_weights(objectives, count)
+    weights = evenly_spaced_weights(objectives, count)
     everywhere = np.random.default_rng(0).dirichlet(np.ones(objectives), size=2000)
     apart = min(np.linalg.norm(a - b) for i, a in enumerate(weights) for b in weights[:i])
     farthest = np.linalg.norm(everywhere[:, None] - weights, axis=2).min(axis=1).max()

@@ -10,7 +10,7 @@ from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.units import RunningUnits
 
 
@@ -22,7 +22,7 @@ def environment(small_config):
 @pytest.fixture(scope="package")
 def make_policy(small_config, environment):
     """A policy with random numbers in every place of its snapshot."""
-    shape = jax.eval_shape(MOPPO(environment, small_config.ppo).initial_learner, jax.random.key(0))
+    shape = jax.eval_shape(MOPPO(environment, small_config.ppo).initial_train_state, jax.random.key(0))
 
     def make(number):
         generator = np.random.default_rng(number)
@@ -30,7 +30,7 @@ def make_policy(small_config, environment):
         def draw(leaf):
             return (generator.normal(size=leaf.shape) * 1000).astype(leaf.dtype)
 
-        vectors = {name: generator.normal(size=3) for name in ("weights", "values", "spread", "discounted")}
+        vectors = {name: generator.normal(size=3) for name in ("weights", "values", "std", "discounted")}
         warm_up = number < 4
         return Policy(
             id=number,

@@ -19,7 +19,7 @@ from jmorl.storage.checkpoints import (
     stored_generations,
     write_checkpoint,
 )
-from jmorl.storage.packing import pack, unpack
+from jmorl.storage.serialization import pack, unpack
 from jmorl.storage.versions import NewerFormat
 from tests.storage.test_packing import assert_same
 

@@ -16,8 +16,8 @@ from jmorl.storage.checkpoints import (
     read_checkpoint,
     write_checkpoint,
 )
-from jmorl.storage.packing import pack
 from jmorl.storage.policy_file import PolicyFileError, load_policy
+from jmorl.storage.serialization import pack
 from tests.stored import stored_linear_policy
 
 

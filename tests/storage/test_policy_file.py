@@ -17,13 +17,13 @@ from jmorl.storage.versions import NewerFormat
 
 @pytest.fixture
 def saved(make_policy, environment, small_config, tmp_path):
-    """A run folder with one policy that is also its choice, and the learner in it."""
+    """A run folder with one policy that is also its choice, and the train state in it."""
     policy = make_policy(17)
     (tmp_path / "run" / "policies").mkdir(parents=True)
-    learner = MOPPO(environment, small_config.ppo).initial_learner(jax.random.key(3))
-    statistics = learner.observation_statistics.replace(mean=np.float32([1, -2]), variance=np.float32([4, 0.25]))
-    learner = jax.device_get(learner.replace(observation_statistics=statistics))
-    policy = policy.__class__(**{**vars(policy), "snapshot": learner})
+    train_state = MOPPO(environment, small_config.ppo).initial_train_state(jax.random.key(3))
+    statistics = train_state.observation_statistics.replace(mean=np.float32([1, -2]), variance=np.float32([4, 0.25]))
+    train_state = jax.device_get(train_state.replace(observation_statistics=statistics))
+    policy = policy.__class__(**{**vars(policy), "snapshot": train_state})
     for name in ("chosen.npz", "policies/00017.npz"):
         save_policy(tmp_path / "run" / name, policy, environment, small_config, "run-id")
     return tmp_path / "run", policy
@@ -43,7 +43,7 @@ def test_the_header_says_what_the_policy_is(saved, environment, small_config):
     assert header["environment"] == small_config.env
     assert header["objectives"] == [vars(objective) for objective in environment.objectives]
     assert header["values"] == policy.raw.tolist()
-    assert (header["score"], header["spread"]) == (policy.values.tolist(), policy.spread.tolist())
+    assert (header["score"], header["std"]) == (policy.values.tolist(), policy.std.tolist())
     assert header["weights"] == policy.weights.tolist()
     assert header["network"]["sizes"] == [2, 64, 64, 2] and header["network"]["activation"] == "tanh"
     assert header["run"] == {"id": "run-id", "config": small_config.digest(), "method": "interactive", "seed": 1}

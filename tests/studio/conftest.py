@@ -5,7 +5,7 @@ import queue
 import pytest
 
 import envs
-from jmorl.storage.continuing import Continued
+from jmorl.storage.resume import Continued
 from jmorl.storage.run_folder import RunFolder
 from jmorl.studio.session import Session
 

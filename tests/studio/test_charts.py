@@ -12,12 +12,12 @@ from jmorl.config import resolve
 from jmorl.decision.protocol import Question
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
-from jmorl.steering import Prospect
-from jmorl.studio import dialogue, words
+from jmorl.state import Prospect
+from jmorl.studio import dialogue, texts
 from jmorl.studio.curves import curve_options
-from jmorl.studio.desk import Desk
 from jmorl.studio.front_chart import front_marks, front_options
 from jmorl.studio.parallel_chart import parallel_marks, parallel_options
+from jmorl.studio.selection import Selection
 from jmorl.studio.view import Generation, View
 
 VALUES = {4: (-80.0, -20.0), 9: (-70.0, -40.0), 2: (-60.0, -60.0), 5: (-90.0, -10.0)}
@@ -25,7 +25,7 @@ VALUES = {4: (-80.0, -20.0), 9: (-70.0, -40.0), 2: (-60.0, -60.0), 5: (-90.0, -1
 
 def policy(number, values):
     vectors = {name: np.array(values) for name in ("values", "discounted")}
-    return Policy(number, 1, None, np.array([0.5, 0.5]), spread=np.array([0.5, 2.0]), snapshot=None, **vectors)
+    return Policy(number, 1, None, np.array([0.5, 0.5]), std=np.array([0.5, 2.0]), snapshot=None, **vectors)
 
 
 @pytest.fixture
@@ -84,9 +84,9 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
     for shown in (view, empty):
         for options in (
             front_options(shown, (0, 1), asked),
-            front_marks(shown, Desk().with_policy(9), (0, 1), asked),
+            front_marks(shown, Selection().with_policy(9), (0, 1), asked),
             parallel_options(shown),
-            parallel_marks(shown, Desk().with_policy(9)),
+            parallel_marks(shown, Selection().with_policy(9)),
             curve_options(shown),
         ):
             assert options["tooltip"]["renderMode"] == "richText"
@@ -95,12 +95,12 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
 
 
 def test_marks_lie_exactly_over_the_chart(view):
-    chart, marks = front_options(view, (1, 0), None), front_marks(view, Desk().with_policy(9), (1, 0), None)
+    chart, marks = front_options(view, (1, 0), None), front_marks(view, Selection().with_policy(9), (1, 0), None)
     for axis in ("xAxis", "yAxis"):
         assert [chart[axis][end] for end in ("min", "max")] == [marks[axis][end] for end in ("min", "max")]
         assert chart[axis]["show"] and not marks[axis]["show"]
     assert chart["grid"] == marks["grid"]
-    lines, marked = parallel_options(view), parallel_marks(view, Desk().with_policy(9))
+    lines, marked = parallel_options(view), parallel_marks(view, Selection().with_policy(9))
     for shown, hidden in zip(lines["parallelAxis"], marked["parallelAxis"], strict=True):
         assert (shown["min"], shown["max"]) == (hidden["min"], hidden["max"]) and not hidden["name"]
     assert all(lines["parallel"][side] == marked["parallel"][side] for side in ("left", "right", "top", "bottom"))
@@ -112,7 +112,7 @@ def test_charts_have_the_same_series_whatever_there_is_to_see(view):
     empty = replace(view, front=(), generations=(), previous=None, choices=(), bounds=np.full(2, -np.inf))
     for much, little in (
         (front_options(view, (0, 1), asked), front_options(empty, (0, 1), None)),
-        (front_marks(view, Desk().with_policy(9), (0, 1), asked), front_marks(empty, Desk(), (0, 1), None)),
+        (front_marks(view, Selection().with_policy(9), (0, 1), asked), front_marks(empty, Selection(), (0, 1), None)),
         (parallel_options(view), parallel_options(empty)),
         (curve_options(view), curve_options(empty)),
     ):
@@ -123,9 +123,9 @@ def test_what_cannot_be_chosen_says_why(view):
     gone = policy(77, (-99.0, -99.0))
     final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
     for each in (view, final):
-        assert "cannot be chosen" in words.consequences(replace(each, previous=gone), None, gone)
-    assert words.consequences(final, None, view.front[2]) == "Outside the bounds, so it cannot be the result"
-    assert words.consequences(final, None, view.front[0]) == "born in generation 1"
+        assert "cannot be chosen" in texts.consequences(replace(each, previous=gone), None, gone)
+    assert texts.consequences(final, None, view.front[2]) == "Outside the bounds, so it cannot be the result"
+    assert texts.consequences(final, None, view.front[0]) == "born in generation 1"
 
 
 def test_the_axes_hold_the_choices_and_what_enautilus_shows(view):
@@ -134,7 +134,7 @@ def test_the_axes_hold_the_choices_and_what_enautilus_shows(view):
     assert options["xAxis"]["min"] < -130 and options["yAxis"]["min"] < -70
     asked = dialogue.begin(view.front, view.objectives, 1, 3, 2).question
     options = front_options(replace(view, bounds=np.full(2, -np.inf)), (0, 1), asked)
-    you = series(front_marks(view, Desk(), (0, 1), asked))["points of E-NAUTILUS"]["data"][0]["value"][1:3]
+    you = series(front_marks(view, Selection(), (0, 1), asked))["points of E-NAUTILUS"]["data"][0]["value"][1:3]
     assert options["xAxis"]["min"] < you[0] and options["yAxis"]["min"] < you[1]
 
 
@@ -150,9 +150,9 @@ def test_the_journey_ends_with_the_end(view):
 
 
 def test_scores_in_other_units_have_the_raw_returns_beside_them(view):
-    assert words.raw_returns(view, view.front[0]) == ""
+    assert texts.raw_returns(view, view.front[0]) == ""
     scored = replace(view.front[0], raw=np.array([-812.0, -20.5]))
-    assert words.raw_returns(view, scored) == "raw returns: time −812, <b>fuel</b> −20.5"
+    assert texts.raw_returns(view, scored) == "raw returns: time −812, <b>fuel</b> −20.5"
 
 
 def test_lines_say_which_policy_they_are(view):
@@ -163,24 +163,24 @@ def test_lines_say_which_policy_they_are(view):
 def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
     expected = np.array([[-65.0, -30.0], [-75.0, -15.0]])
     prospect = Prospect(np.array([-75.0, -42.0]), np.array([False, True, False, False]), expected)
-    desk = replace(Desk().with_policy(4).with_policy(9), prospects={9: prospect})
-    shown = series(front_marks(view, desk, (0, 1), None))
+    selection = replace(Selection().with_policy(4).with_policy(9), prospects={9: prospect})
+    shown = series(front_marks(view, selection, (0, 1), None))
     assert shown["bounds that would follow"]["markArea"]["data"][0][0] == {"coord": [-75.0, -42.0]}
     assert [point[1:3] for point in shown["expected by the model"]["data"]] == expected.tolist()
     assert [point["label"]["formatter"] for point in shown["laid out"]["data"]] == ["A", "B"]
-    answered = series(front_marks(replace(view, question=None), desk, (0, 1), None))
+    answered = series(front_marks(replace(view, question=None), selection, (0, 1), None))
     assert not answered["expected by the model"]["data"]
-    unfocused = series(front_marks(view, replace(desk, focus=4), (0, 1), None))
+    unfocused = series(front_marks(view, replace(selection, focus=4), (0, 1), None))
     assert (
         not unfocused["bounds that would follow"]["markArea"]["data"] and not unfocused["expected by the model"]["data"]
     )
-    text = words.consequences(view, prospect, view.front[1])
+    text = texts.consequences(view, prospect, view.front[1])
     assert "Rules out 3 of 4 policies: time ≥ −75.0, <b>fuel</b> ≥ −42.0." in text
     assert "expects up to time −65.0, <b>fuel</b> −15.0" in text
 
 
 def test_lines_across_the_axes_have_the_values_of_the_policies(view):
-    shown = series(parallel_options(view)) | series(parallel_marks(view, Desk().with_policy(2)))
+    shown = series(parallel_options(view)) | series(parallel_marks(view, Selection().with_policy(2)))
     assert {line[-1]: tuple(line[:-1]) for line in shown["within the bounds"]["data"]} == {
         number: VALUES[number] for number in (4, 9)
     }
@@ -200,24 +200,26 @@ def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
 
 @pytest.mark.parametrize(("objective", "than", "expected"), [(0, 4, [9, 2]), (1, 4, [5]), (0, None, [5, 4, 9, 2])])
 def test_more_of_an_objective_lists_the_least_change_first(view, objective, than, expected):
-    desk = Desk(more_of=objective, than=than)
-    assert words.wanted(view, desk) == expected
-    rings = series(front_marks(view, desk, (0, 1), None))["more of an objective"]["data"]
+    selection = Selection(more_of=objective, than=than)
+    assert texts.wanted(view, selection) == expected
+    rings = series(front_marks(view, selection, (0, 1), None))["more of an objective"]["data"]
     assert {ring[0] for ring in rings} == set(expected)
 
 
 def test_with_nothing_wanted_there_is_no_ring(view):
-    assert words.wanted(view, Desk()) is None
-    assert not series(front_marks(view, Desk(), (0, 1), None))["more of an objective"]["data"]
+    assert texts.wanted(view, Selection()) is None
+    assert not series(front_marks(view, Selection(), (0, 1), None))["more of an objective"]["data"]
 
 
 def test_the_heading_says_what_is_asked(view):
-    assert words.heading(view, Desk()) == "Generation 2: which of these 4 policies do you prefer?"
-    assert words.heading(view, Desk(more_of=0, than=4)) == "2 policies better in time than policy 4"
+    assert texts.heading(view, Selection()) == "Generation 2: which of these 4 policies do you prefer?"
+    assert texts.heading(view, Selection(more_of=0, than=4)) == "2 policies better in time than policy 4"
     final = replace(view, question=replace(view.question, purpose="final"))
-    assert words.heading(final, Desk()) == "The run is over. Which of these 4 policies is its result?"
+    assert texts.heading(final, Selection()) == "The run is over. Which of these 4 policies is its result?"
     ended = replace(view, question=None, result=view.front[2], timeline=None)
-    assert words.heading(ended, Desk()) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
+    assert (
+        texts.heading(ended, Selection()) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
+    )
 
 
 @pytest.mark.parametrize(
@@ -229,8 +231,8 @@ def test_the_heading_says_what_is_asked(view):
     ],
 )
 def test_the_phase_says_what_is_waited_for(view, changes, text):
-    assert words.phase(replace(view, **changes), now=5.0) == text
+    assert texts.phase(replace(view, **changes), now=5.0) == text
 
 
 def test_a_minus_is_a_minus_only_before_a_number():
-    assert words.minus("x-velocity -3.5, 1e-05 [-2]") == "x-velocity −3.5, 1e-05 [−2]"
+    assert texts.minus("x-velocity -3.5, 1e-05 [-2]") == "x-velocity −3.5, 1e-05 [−2]"

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from jmorl.storage.continuing import branch
+from jmorl.storage.resume import branch
 from jmorl.studio.history import free_folder, read_tree
 
 

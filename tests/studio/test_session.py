@@ -11,7 +11,7 @@ from jmorl.decision.protocol import Answer, Choose
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.search.policy import values_of
 from jmorl.storage.afterwards import choose_afterwards
-from jmorl.storage.continuing import Continued, resume
+from jmorl.storage.resume import Continued, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 from tests.resuming import follow, outcome, train
@@ -211,30 +211,30 @@ def test_what_is_laid_out_is_seen_in_the_light_of_the_question(session):
         session.look_at(policy.id)
     session.look_at(12345)  # there is none
     session.thought()
-    desk = session.desk
-    assert desk.letters == {first.id: "A", second.id: "B"} and desk.focus == second.id
-    assert set(desk.prospects) == {first.id, second.id}
+    selection = session.selection
+    assert selection.letters == {first.id: "A", second.id: "B"} and selection.focus == second.id
+    assert set(selection.prospects) == {first.id, second.id}
     session.answer(question, Answer(second.id))
     session.question()
     session.thought()
-    np.testing.assert_array_equal(session.view.bounds, desk.prospects[second.id].bounds)
-    assert set(session.desk.prospects) <= set(session.desk.letters)
-    for policy in tuple(session.desk.letters):
+    np.testing.assert_array_equal(session.view.bounds, selection.prospects[second.id].bounds)
+    assert set(session.selection.prospects) <= set(session.selection.letters)
+    for policy in tuple(session.selection.letters):
         session.put_away(policy)
-    assert session.desk.focus is None
+    assert session.selection.focus is None
 
 
 def test_more_is_more_than_the_policy_that_was_in_focus_when_it_was_asked_for(session):
     question = session.question()
     first, second = question.front[0].id, question.front[-1].id
     session.more_of(1)
-    assert (session.desk.more_of, session.desk.than) == (1, None)  # nothing to compare with
+    assert (session.selection.more_of, session.selection.than) == (1, None)  # nothing to compare with
     session.look_at(first)
     session.more_of(1)
     session.look_at(second)
-    assert session.desk.than == first
+    assert session.selection.than == first
     session.more_of(None)
-    assert session.desk.more_of is None
+    assert session.selection.more_of is None
 
 
 def test_enautilus_in_a_finished_run_is_what_the_command_would_have_been_led_to(session):
@@ -246,7 +246,7 @@ def test_enautilus_in_a_finished_run_is_what_the_command_would_have_been_led_to(
         assert not session.reply(at, Choose(0))  # another tab was first
     chosen, path = session.dialogue.chosen, session.view.path
     assert json.loads((path / "enautilus.json").read_text())["policy"] == chosen.id
-    assert session.desk.focus == chosen.id
+    assert session.selection.focus == chosen.id
     stored = read_run(path)
     assert choose_afterwards(stored, ScriptedUser(path / "enautilus.jsonl"), 3, 2).id == chosen.id
 

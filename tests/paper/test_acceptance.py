@@ -1,6 +1,6 @@
 """What was to be shown in raw units, and what explains a difference in paper units: by rule from the numbers."""
 
-from jmorl.paper.bars import drift_told, explanations, raw_bar
+from jmorl.paper.acceptance import drift_told, explanations, raw_bar
 from jmorl.paper.data import published
 from tests.paper.test_verdicts import row
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from jmorl.run import Decided, GenerationFinished, run
+from jmorl.events import Decided, GenerationFinished
+from jmorl.loop import run
 from jmorl.search.bounds import within
-from jmorl.steering import prospect
+from jmorl.state import prospect
 
 
 @pytest.fixture(scope="module")

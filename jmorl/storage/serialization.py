@@ -20,11 +20,11 @@ from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.units import RunningUnits
 
 COUNTERS = tuple(field.name for field in fields(RunState) if field.type is int)
-VECTORS = ("weights", "values", "spread", "discounted")  # of a policy, [M]
+VECTORS = ("weights", "values", "std", "discounted")  # of a policy, [M]
 
 
 class PackingError(ValueError):
@@ -72,14 +72,14 @@ def pack(state: RunState) -> PackedState:
 def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -> RunState:
     """The state as it was, bit for bit.
 
-    Raises PackingError if its snapshots are not those of the learners that `config` describes.
+    Raises PackingError if its snapshots are not those of the train_states that `config` describes.
     """
     document, arrays = packed.document, packed.arrays
-    learner = jax.eval_shape(MOPPO(environment, config.ppo).initial_learner, jax.eval_shape(jax.random.key, 0))
-    expected = _columns(learner)
+    train_state = jax.eval_shape(MOPPO(environment, config.ppo).initial_train_state, jax.eval_shape(jax.random.key, 0))
+    expected = _columns(train_state)
     if document["snapshot"] != expected:
-        raise PackingError(f"it has learners of another shape: {_first_difference(document['snapshot'], expected)}")
-    snapshots = _unpacked(arrays, len(document["policies"]), learner)
+        raise PackingError(f"it has train_states of another shape: {_first_difference(document['snapshot'], expected)}")
+    snapshots = _unpacked(arrays, len(document["policies"]), train_state)
     policies = {
         origin["id"]: Policy(
             id=origin["id"],
@@ -146,9 +146,9 @@ def _packed(snapshots: Sequence[Any]) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _unpacked(arrays: Mapping[str, np.ndarray], count: int, learner: Any) -> list[Any]:
-    """The snapshots, shaped as `learner`. Each has its own memory, so that none keeps the others alive."""
-    leaves, tree = jax.tree.flatten(learner)
+def _unpacked(arrays: Mapping[str, np.ndarray], count: int, train_state: Any) -> list[Any]:
+    """The snapshots, shaped as `train_state`. Each has its own memory, so that none keeps the others alive."""
+    leaves, tree = jax.tree.flatten(train_state)
     found: list[list[Any]] = [[None] * len(leaves) for _ in range(count)]
     for kind, indices in _kinds(leaves).items():
         ends = np.cumsum([leaves[index].size for index in indices])[:-1]

@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import envs
+from envs.checks import check_environment
 from envs.core import Environment
-from envs.declared import check_environment
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
+from jmorl.events import Event
 from jmorl.learning.population import Population
-from jmorl.run import Event, run
+from jmorl.loop import run
 from jmorl.search.policy import Policy
-from jmorl.steering import RunState
+from jmorl.state import RunState
 from jmorl.storage.checkpoints import (
     Checkpoint,
     DamagedCheckpoint,
@@ -31,8 +32,8 @@ from jmorl.storage.decision_log import DecisionLog
 from jmorl.storage.files import remove_partial, write_json
 from jmorl.storage.lock import FolderInUse, RunLock
 from jmorl.storage.manifest import Manifest, circumstances, differences, now, read_manifest
-from jmorl.storage.packing import PackingError, unpack
 from jmorl.storage.run_folder import RunFolder, check_free
+from jmorl.storage.serialization import PackingError, unpack
 from jmorl.storage.versions import NewerFormat
 
 

@@ -5,9 +5,9 @@ the command line, the run folder, a page, reads the same events.
 """
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import jax
 import numpy as np
@@ -15,16 +15,14 @@ import numpy as np
 import envs
 from envs.core import Environment
 from jmorl.config import Config
-from jmorl.decision.protocol import Answer, DecisionMaker, Purpose, Question
+from jmorl.decision.protocol import DecisionMaker, Purpose, Question
 from jmorl.decision.users import make_user
-from jmorl.learning.moppo import Learner
+from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
+from jmorl.learning.moppo import TrainState
 from jmorl.learning.population import Population
 from jmorl.scoring import Scores, paper_scores, raw_scores
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.metrics import (
-    FrontMetrics,
-    PredictionMetrics,
-    UtilityMetrics,
     front_metrics,
     prediction_metrics,
     utility_metrics,
@@ -33,8 +31,8 @@ from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Records
 from jmorl.search.scaling import range_scale
 from jmorl.search.selection import Task, select_tasks
-from jmorl.search.weights import spread_weights
-from jmorl.steering import (
+from jmorl.search.weights import evenly_spaced_weights
+from jmorl.state import (
     RunState,
     bounds_after,
     candidate_weights,
@@ -50,62 +48,6 @@ REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor th
 
 
 @dataclass(frozen=True)
-class Seconds:
-    """Where the time of a generation went, waiting for an answer not counted."""
-
-    select: float = 0.0
-    train: float = 0.0
-    evaluate: float = 0.0
-
-    @property
-    def total(self) -> float:
-        return self.select + self.train + self.evaluate
-
-
-@dataclass(frozen=True)
-class Compiled:
-    """The programs are compiled; nothing has been trained."""
-
-    seconds: float
-    devices: int
-
-
-@dataclass(frozen=True)
-class Resumed:
-    """The run goes on from this state, instead of beginning with a warm-up."""
-
-    state: RunState
-    steps: int  # environment steps used for learning before
-
-
-@dataclass(frozen=True)
-class Decided:
-    """The decision maker has answered."""
-
-    question: Question
-    answer: Answer
-    chosen: Policy
-    bounds: np.ndarray  # [M] that follow from the choice; from a final one none do, so those in force
-    seconds: float  # how long the run waited for the answer
-
-
-@dataclass(frozen=True)
-class GenerationFinished:
-    """A generation (0: the warm-up) is trained, evaluated and in the archive."""
-
-    state: RunState
-    offspring: tuple[Policy, ...]  # in paper units generation 0 begins with the untrained agents
-    candidates: int  # policies the search could continue; 0 in the warm-up
-    steps: int  # environment steps used for learning so far
-    seconds: Seconds
-    steps_per_second: float  # of this generation, selection and evaluation included
-    training: Mapping[str, float]  # losses, entropy and KL divergence of the last iteration, means over the agents
-    front: FrontMetrics
-    utility: UtilityMetrics
-    prediction: PredictionMetrics
-
-
-@dataclass(frozen=True)
 class Lineage:
     """Where the offspring of a generation come from."""
 
@@ -113,18 +55,6 @@ class Lineage:
     predicted: np.ndarray  # [P, M] raw units
     candidates: int  # policies that could have been continued
     select_seconds: float
-
-
-@dataclass(frozen=True)
-class RunFinished:
-    """The run is over; `chosen` is its result."""
-
-    state: RunState
-    chosen: Policy
-    reason: Literal["budget", "satisfied", "stopped"]
-
-
-Event = Compiled | Resumed | Decided | GenerationFinished | RunFinished
 
 
 def run(
@@ -215,13 +145,13 @@ class _Run:
             bounds=np.full(objectives, -np.inf),
             units=initial_units(objectives) if in_paper_units else None,
         )
-        weights = spread_weights(objectives, self.config.population.agents)
-        learners = self.population.initialize(self.initial_key)
+        weights = evenly_spaced_weights(objectives, self.config.population.agents)
+        train_states = self.population.initialize(self.initial_key)
         # The authors score untrained agents, too: they enter archive and buffer, and set the units.
         untrained: tuple[Policy, ...] = ()
         if in_paper_units:
-            state, untrained = self._evaluated(state, learners, weights, None)
-        finished = self._trained(state, learners, weights, self.config.population.warmup_iterations)
+            state, untrained = self._evaluated(state, train_states, weights, None)
+        finished = self._trained(state, train_states, weights, self.config.population.warmup_iterations)
         return replace(finished, offspring=(*untrained, *finished.offspring))
 
     def generation(self, state: RunState) -> GenerationFinished:
@@ -236,9 +166,9 @@ class _Run:
             len(continued),
             time.perf_counter() - started,
         )
-        learners = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in lineage.parents))
+        train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in lineage.parents))
         weights = self.candidate_weights[[task.weight for task in tasks]]
-        return self._trained(state, learners, weights, self.config.population.iterations, lineage)
+        return self._trained(state, train_states, weights, self.config.population.iterations, lineage)
 
     def ask(self, state: RunState, purpose: Purpose, front: Sequence[Policy]) -> Decided:
         """Put a question to the decision maker."""
@@ -290,19 +220,19 @@ class _Run:
     def _trained(
         self,
         state: RunState,
-        learners: Learner,
+        train_states: TrainState,
         weights: np.ndarray,
         iterations: int,
         lineage: Lineage | None = None,
     ) -> GenerationFinished:
-        """Train learners [P] with weights [P, M], evaluate them, and take them in."""
+        """Train agents [P] with weights [P, M], evaluate them, and take them in."""
         started = time.perf_counter()
         key = jax.random.fold_in(self.training_key, state.generation)
-        learners, diagnostics = self.population.train(
-            learners, weights, key, iterations, self.config.learning_rate(state.iterations)
+        train_states, diagnostics = self.population.train(
+            train_states, weights, key, iterations, self.config.learning_rate(state.iterations)
         )
         trained = time.perf_counter()
-        state, offspring = self._evaluated(state, learners, weights, lineage)
+        state, offspring = self._evaluated(state, train_states, weights, lineage)
         evaluated = time.perf_counter()
         state = replace(state, iterations=state.iterations + iterations)
         seconds = Seconds(lineage.select_seconds if lineage else 0.0, trained - started, evaluated - trained)
@@ -320,15 +250,15 @@ class _Run:
         )
 
     def _evaluated(
-        self, state: RunState, learners: Learner, weights: np.ndarray, lineage: Lineage | None
+        self, state: RunState, train_states: TrainState, weights: np.ndarray, lineage: Lineage | None
     ) -> tuple[RunState, tuple[Policy, ...]]:
-        """The state with learners [P], trained with weights [P, M], scored and taken in; and their policies."""
-        returns = self.population.evaluate(learners, evaluation_keys(self.config, state.policies))
+        """The state with agents [P], trained with weights [P, M], scored and taken in; and their policies."""
+        returns = self.population.evaluate(train_states, evaluation_keys(self.config, state.policies))
         scores, units = raw_scores(returns), None
         if state.units:
             discounts = self.config.ppo.discount, self.config.evaluation.scale_discount
             scores, units = paper_scores(returns, state.units, *discounts)
-        offspring = _policies(state, learners, weights, scores, lineage)
+        offspring = _policies(state, train_states, weights, scores, lineage)
         state = self._taken_in(state, offspring, lineage)
         evaluation_steps, policies = state.evaluation_steps + scores.steps, state.policies + len(offspring)
         return replace(state, units=units, evaluation_steps=evaluation_steps, policies=policies), offspring
@@ -351,7 +281,7 @@ class _Run:
 
 
 def _policies(
-    state: RunState, learners: Learner, weights: np.ndarray, scores: Scores, lineage: Lineage | None
+    state: RunState, train_states: TrainState, weights: np.ndarray, scores: Scores, lineage: Lineage | None
 ) -> tuple[Policy, ...]:
     """Learners [P] and their scores as records."""
     return tuple(
@@ -361,10 +291,10 @@ def _policies(
             parent=lineage.parents[index].id if lineage else None,
             weights=weights[index],
             values=scores.values[index],
-            spread=scores.spread[index],
+            std=scores.std[index],
             discounted=scores.discounted[index],
             # Copied, or each policy would keep those of its whole generation in memory.
-            snapshot=jax.tree.map(lambda leaf, index=index: leaf[index].copy(), learners),
+            snapshot=jax.tree.map(lambda leaf, index=index: leaf[index].copy(), train_states),
             predicted=lineage.predicted[index] if lineage else None,
             raw=None if scores.raw is None else scores.raw[index],
         )

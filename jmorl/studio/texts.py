@@ -7,8 +7,8 @@ import numpy as np
 from jmorl.display.text import duration, number_format, plural, short_count, values_in_words
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
-from jmorl.steering import Prospect
-from jmorl.studio.desk import Desk
+from jmorl.state import Prospect
+from jmorl.studio.selection import Selection
 from jmorl.studio.view import PERSON, View
 
 KEYS = (
@@ -69,12 +69,12 @@ def share_done(view: View, now: float) -> float:
     return timeline.steps(now) / timeline.total_steps if timeline else float(view.result is not None)
 
 
-def heading(view: View, desk: Desk) -> str:
+def heading(view: View, selection: Selection) -> str:
     """What is asked, or what there is to see."""
-    question, more = view.question, wanted(view, desk)
-    if more is not None and desk.more_of is not None and desk.than is not None:
-        label = view.objectives[desk.more_of].label
-        return f"{plural(len(more), 'policy')} better in {label} than policy {desk.than}"
+    question, more = view.question, wanted(view, selection)
+    if more is not None and selection.more_of is not None and selection.than is not None:
+        label = view.objectives[selection.more_of].label
+        return f"{plural(len(more), 'policy')} better in {label} than policy {selection.than}"
     if question:
         policies = plural(len(question.front), "policy")
         if question.purpose == "final":
@@ -117,8 +117,8 @@ def formats_of(view: View) -> list[str]:
 
 def score_of_each(view: View, policy: Policy) -> list[str]:
     """`−66.1 ±0.4 -steps` for each objective: raw units, with their spread over the evaluation episodes."""
-    each = zip(view.objectives, policy.values, policy.spread, formats_of(view), strict=True)
-    return [minus(f"{value:{fmt}} ±{spread:{fmt}}") + f" {o.unit}" for o, value, spread, fmt in each]
+    each = zip(view.objectives, policy.values, policy.std, formats_of(view), strict=True)
+    return [minus(f"{value:{fmt}} ±{std:{fmt}}") + f" {o.unit}" for o, value, std, fmt in each]
 
 
 def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
@@ -142,14 +142,14 @@ def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
     return f"{ruled_out} The model expects up to {best}."
 
 
-def wanted(view: View, desk: Desk) -> list[int] | None:
+def wanted(view: View, selection: Selection) -> list[int] | None:
     """The policies that have more of what there should be more of, the least change first; None for all."""
-    if desk.more_of is None:
+    if selection.more_of is None:
         return None
-    reference = view.policy(desk.than) if desk.than is not None else None
-    least = reference.values[desk.more_of] if reference else -np.inf
-    members = sorted(view.front, key=lambda policy: float(policy.values[desk.more_of]))
-    return [policy.id for policy in members if policy.values[desk.more_of] > least]
+    reference = view.policy(selection.than) if selection.than is not None else None
+    least = reference.values[selection.more_of] if reference else -np.inf
+    members = sorted(view.front, key=lambda policy: float(policy.values[selection.more_of]))
+    return [policy.id for policy in members if policy.values[selection.more_of] > least]
 
 
 def minus(text: str) -> str:

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from jmorl.steering import Prospect
+from jmorl.state import Prospect
 
 LETTERS = "ABC"  # of the places
 
 
 @dataclass(frozen=True, eq=False)
-class Desk:
+class Selection:
     """The policies being looked at, the one in focus, and what there should be more of."""
 
     places: Mapping[str, int] = field(default_factory=dict)  # letter -> policy; the one looked at longest first
@@ -28,7 +28,7 @@ class Desk:
         """What choosing the policy in focus would mean, if that is known."""
         return None if self.focus is None else self.prospects.get(self.focus)
 
-    def with_policy(self, policy: int) -> "Desk":
+    def with_policy(self, policy: int) -> "Selection":
         """Put a policy in focus; a new one comes to a free place, or to that of the one looked at longest."""
         if policy in self.places.values():
             return replace(self, focus=policy)
@@ -37,7 +37,7 @@ class Desk:
         others = {each: there for each, there in self.places.items() if each != letter}
         return replace(self, places={**others, letter: policy}, focus=policy)
 
-    def without(self, policy: int) -> "Desk":
+    def without(self, policy: int) -> "Selection":
         """Put a policy away; of those left the last one comes into focus."""
         left = {letter: there for letter, there in self.places.items() if there != policy}
         focus = next(reversed(left.values()), None) if self.focus == policy else self.focus

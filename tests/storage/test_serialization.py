@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from jmorl.search.archive import Archive
-from jmorl.steering import RunState
-from jmorl.storage.packing import PackingError, pack, unpack
+from jmorl.state import RunState
+from jmorl.storage.serialization import PackingError, pack, unpack
 
 
 def bits(array):
@@ -88,7 +88,7 @@ def test_there_are_a_few_arrays_whatever_the_number_of_policies(make_state):
 
 def test_another_network_is_refused_by_name(make_state, small_config, environment):
     wider = small_config.replace(ppo={"hidden_sizes": (64, 32)})
-    with pytest.raises(PackingError, match=r"learners of another shape: .*Dense_1.*\[64\].* where .*\[32\]"):
+    with pytest.raises(PackingError, match=r"train_states of another shape: .*Dense_1.*\[64\].* where .*\[32\]"):
         unpack(pack(make_state(1)), wider, environment)
 
 

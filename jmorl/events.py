@@ -1,0 +1,80 @@
+"""What a run yields: an event for everything that happens. Whoever watches a run reads these."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from jmorl.decision.protocol import Answer, Question
+from jmorl.search.metrics import FrontMetrics, PredictionMetrics, UtilityMetrics
+from jmorl.search.policy import Policy
+from jmorl.state import RunState
+
+
+@dataclass(frozen=True)
+class Seconds:
+    """Where the time of a generation went, waiting for an answer not counted."""
+
+    select: float = 0.0
+    train: float = 0.0
+    evaluate: float = 0.0
+
+    @property
+    def total(self) -> float:
+        return self.select + self.train + self.evaluate
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """The programs are compiled; nothing has been trained."""
+
+    seconds: float
+    devices: int
+
+
+@dataclass(frozen=True)
+class Resumed:
+    """The run goes on from this state, instead of beginning with a warm-up."""
+
+    state: RunState
+    steps: int  # environment steps used for learning before
+
+
+@dataclass(frozen=True)
+class Decided:
+    """The decision maker has answered."""
+
+    question: Question
+    answer: Answer
+    chosen: Policy
+    bounds: np.ndarray  # [M] that follow from the choice; from a final one none do, so those in force
+    seconds: float  # how long the run waited for the answer
+
+
+@dataclass(frozen=True)
+class GenerationFinished:
+    """A generation (0: the warm-up) is trained, evaluated and in the archive."""
+
+    state: RunState
+    offspring: tuple[Policy, ...]  # in paper units generation 0 begins with the untrained agents
+    candidates: int  # policies the search could continue; 0 in the warm-up
+    steps: int  # environment steps used for learning so far
+    seconds: Seconds
+    steps_per_second: float  # of this generation, selection and evaluation included
+    training: Mapping[str, float]  # losses, entropy and KL divergence of the last iteration, means over the agents
+    front: FrontMetrics
+    utility: UtilityMetrics
+    prediction: PredictionMetrics
+
+
+@dataclass(frozen=True)
+class RunFinished:
+    """The run is over; `chosen` is its result."""
+
+    state: RunState
+    chosen: Policy
+    reason: Literal["budget", "satisfied", "stopped"]
+
+
+Event = Compiled | Resumed | Decided | GenerationFinished | RunFinished
