@@ -6,7 +6,9 @@ module that does so. An id may carry options of its environment: `envs.make("mo-
 
 import importlib
 import inspect
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from envs.checks import NotAsDeclared, check_declaration, check_environment
@@ -14,6 +16,7 @@ from envs.core import Environment, EpisodeState, Objective, Step, Transition
 from envs.failures import failure
 from envs.half_cheetah import HalfCheetah
 from envs.mountain_car import MountainCar
+from envs.names import did_you_mean, nearest
 
 __all__ = [
     "Environment",
@@ -52,7 +55,8 @@ def make(id: str, **options: Any) -> Environment[Any]:
     if module:
         _import(id, module)
     if name not in _registry:
-        raise ValueError(f"unknown environment {name!r}; known: {', '.join(ids())}")
+        known = f"known: {', '.join(ids())}{did_you_mean(nearest(name, ids()))}"
+        raise ValueError(f"unknown environment {name!r}; {known}{_hidden(module)}")
     factory, options = _registry[name], written | options
     _check_options(name, factory, options)
     try:
@@ -80,7 +84,20 @@ def _import(id: str, module: str) -> None:
         importlib.import_module(module)
     except Exception as error:
         said = str(error) if isinstance(error, ImportError) else failure(error)
-        raise ValueError(f"environment {id!r}: cannot import {module!r}: {said}") from error
+        raise ValueError(f"environment {id!r}: cannot import {module!r}: {said}{_hidden(module)}") from error
+
+
+def _hidden(module: str) -> str:
+    """Name the module of the working directory that was meant, if another one of the same name hides it."""
+    name = module.partition(".")[0]
+    meant = [path for path in (Path(name).absolute(), Path(f"{name}.py").absolute()) if name and path.exists()]
+    found = sys.modules.get(name)
+    if not meant or found is None:
+        return ""
+    place = getattr(found, "__file__", None) or next(iter(getattr(found, "__path__", ())), "Python")
+    if any(Path(place).resolve().is_relative_to(path.resolve()) for path in meant):
+        return ""
+    return f"; {meant[0]} is hidden by {place}, which has the same name: rename yours"
 
 
 def _check_options(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> None:
@@ -89,7 +106,8 @@ def _check_options(name: str, factory: Callable[..., Environment[Any]], options:
     for option in options:
         if option not in parameters:
             known = ", ".join(parameters) or "none"
-            raise ValueError(f"environment {name!r} has no option {option!r}; known: {known}")
+            near = did_you_mean(nearest(option, parameters))
+            raise ValueError(f"environment {name!r} has no option {option!r}; known: {known}{near}")
     variadic = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
     needed = [each.name for each in parameters.values() if each.default is each.empty and each.kind not in variadic]
     missing = [option for option in needed if option not in options]

@@ -3,6 +3,7 @@
 The names here are all that a program needs; see the README. Settings are in `jmorl.config`, events in `jmorl.events`.
 """
 
+import jmorl.module_path  # noqa: F401  it decides which modules the others find
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.navigation import navigate
 from jmorl.decision.protocol import Answer, DecisionMaker, Question

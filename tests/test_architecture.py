@@ -15,9 +15,10 @@ MAY_IMPORT = {
     "jmorl.display": {"envs", "jmorl.search"},
     "jmorl.decision": {"envs", "jmorl.display", "jmorl.search"},
     "jmorl.config": {"envs", "jmorl.decision"},
+    "jmorl.module_path": set(),
     "jmorl.signals": set(),
     "jmorl.units": {"envs"},
-    "jmorl.arguments": {"jmorl.config"},
+    "jmorl.arguments": {"envs", "jmorl.config", "jmorl.display"},
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"jmorl.learning", "jmorl.units"},
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
@@ -28,8 +29,8 @@ MAY_IMPORT = {
         *("jmorl.state", "jmorl.units"),
     },
     "jmorl.storage": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.loop", "jmorl.search"),
-        *("jmorl.state", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.loop"),
+        *("jmorl.search", "jmorl.state", "jmorl.units"),
     },
     "jmorl.report": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),

@@ -114,3 +114,10 @@ def test_the_readmes_environment_trains_from_the_command_line(tmp_path):
     evaluate = [JMORL, "evaluate", "run", "--episodes", "3"]
     evaluated = subprocess.run(evaluate, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert evaluated.returncode == 0, evaluated.stderr
+
+
+def test_what_is_meant_is_named():
+    with pytest.raises(ValueError, match="did you mean 'mo-halfcheetah-v5'?"):
+        envs.make("mo-halfchetah-v5")
+    with pytest.raises(ValueError, match="known: physics; did you mean 'physics'?"):
+        envs.make("mo-halfcheetah-v5,physic=mjx")
