@@ -3,10 +3,11 @@
 import argparse
 import re
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+from envs.names import did_you_mean, nearest
 from jmorl.config import PRESETS, Config, Section
+from jmorl.display.characters import to_path, unicode_argument
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
 FLAG, NEGATIVE_VALUE = re.compile(r"--[^=]+"), re.compile(r"-\.?\d.*")
@@ -19,16 +20,35 @@ PAPER_ITEMS = ("table1", "fig5", "fig6", "fig9", "fig10", "table2", "fig7", "fig
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """The options that are given. A flag may be followed by `-999,-999`, which argparse alone takes for a flag."""
     joined: list[str] = []
-    for argument in arguments:
+    for argument in map(unicode_argument, arguments):
         if joined and FLAG.fullmatch(joined[-1]) and NEGATIVE_VALUE.fullmatch(argument):
             argument = f"{joined.pop()}={argument}"
         joined.append(argument)
     return parser().parse_args(joined)
 
 
+class _Parser(argparse.ArgumentParser):
+    """One whose errors are a line each, and which names the flag that was meant."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            flags = [argument.partition("=")[0] for argument in unknown if argument.startswith("-")]
+            many = f"too many arguments: {' '.join(unknown)}"
+            self.error("; ".join(map(self._unknown, flags)) if flags else many)
+        return options, unknown
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"jmorl: {message} ({self.prog} --help says what there is)\n")
+
+    def _unknown(self, flag: str) -> str:
+        meant = nearest(flag.strip("-"), (each.strip("-") for each in self._option_string_actions))
+        return f"there is no flag {flag}{did_you_mean(meant and f'--{meant}')}"
+
+
 def parser() -> argparse.ArgumentParser:
     """What the command line takes. `command` of the parsed options is the name of the one given."""
-    whole = argparse.ArgumentParser(
+    whole = _Parser(
         prog="jmorl",
         description="Interactive multi-objective reinforcement learning: train a population, choose, converge.",
         epilog="Exit codes: 0 done, 1 the run failed (what it had is kept), 2 bad input (nothing was made), "
@@ -42,7 +62,7 @@ def parser() -> argparse.ArgumentParser:
     enautilus = commands.add_parser(
         "enautilus", help="choose a policy from the front of a finished run, step by step (E-NAUTILUS)"
     )
-    enautilus.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    enautilus.add_argument("run", type=to_path, metavar="RUN", help="run folder")
     enautilus.add_argument("--user", help="who decides, as in train (default: the run's own user)")
     enautilus.add_argument("--iterations", type=_count, default=3, help="choices until the front (default: 3)")
     enautilus.add_argument("--points", type=_count, default=3, help="points shown each time (default: 3)")
@@ -57,14 +77,14 @@ def parser() -> argparse.ArgumentParser:
 
     play = commands.add_parser("play", help="draw an episode of a saved policy: animation, film, or strip of poses")
     _add_policy(play)
-    play.add_argument("--out", type=Path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .png (a strip)")
+    play.add_argument("--out", type=to_path, required=True, metavar="FILE", help="ends in .gif, .mp4 or .png (a strip)")
     play.add_argument("--seed", type=_seed, default=0, help="of the start state, as in evaluate (default: 0)")
     play.add_argument("--steps", type=_count, help="at most so many (default: the whole episode)")
     play.add_argument("--size", type=_size, metavar="PIXELS", help="width (default: 640, for a strip 1280)")
     play.add_argument("--force", action="store_true", help="overwrite the file")
 
     show = commands.add_parser("show", help="print a run's tables and draw its plots")
-    show.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    show.add_argument("run", type=to_path, metavar="RUN", help="run folder")
 
     _add_paper(commands)
 
@@ -103,8 +123,8 @@ def _add_paper(commands: Any) -> None:
         help="made in one program, where one alone does not fill the machine (default: 1)",
     )
     paper.add_argument("--report", action="store_true", help="make no runs, only the report of those there are")
-    paper.add_argument("--out", type=Path, metavar="FOLDER", help="default: benchmarks/paper, or runs/paper-quick")
-    paper.add_argument("--work", type=Path, metavar="FOLDER", help="run folders (default: runs/paper, or OUT/work)")
+    paper.add_argument("--out", type=to_path, metavar="FOLDER", help="default: benchmarks/paper, or runs/paper-quick")
+    paper.add_argument("--work", type=to_path, metavar="FOLDER", help="run folders (default: runs/paper, or OUT/work)")
 
 
 def _add_studio(commands: Any) -> None:
@@ -115,7 +135,7 @@ def _add_studio(commands: Any) -> None:
         f"{OF_SETTINGS}",
         formatter_class=argparse.RawTextHelpFormatter,
     )
-    studio.add_argument("run", type=Path, nargs="?", metavar="RUN", help="run folder, to go on with or to look at")
+    studio.add_argument("run", type=to_path, nargs="?", metavar="RUN", help="run folder, to go on with or to look at")
     studio.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine alone)")
     studio.add_argument("--port", type=_port, default=8080, help="default: 8080")
     studio.add_argument("--token", help="what the page asks for (default: none on this machine, else a random one)")
@@ -126,9 +146,9 @@ def _add_studio(commands: Any) -> None:
 def _add_new_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", default="default", help=f"{', '.join(PRESETS)} (default: default)")
     parser.add_argument(
-        "--config", type=Path, metavar="FILE", help="settings as TOML, for instance a run's config.toml"
+        "--config", type=to_path, metavar="FILE", help="settings as TOML, for instance a run's config.toml"
     )
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="run folder (default: runs/DATE-TIME)")
+    parser.add_argument("--out", type=to_path, metavar="FOLDER", help="run folder (default: runs/DATE-TIME)")
     parser.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
 
 
@@ -136,23 +156,23 @@ def _add_continuing(commands: Any) -> None:
     resume = commands.add_parser(
         "resume", help="go on with a run that was interrupted, to the result it would have had"
     )
-    resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    resume.add_argument("run", type=to_path, metavar="RUN", help="run folder")
     _add_output(resume)
 
     branch = commands.add_parser("branch", help="begin a new run where a run was after one of its generations")
-    branch.add_argument("run", type=Path, metavar="RUN", help="run folder, which stays as it is")
+    branch.add_argument("run", type=to_path, metavar="RUN", help="run folder, which stays as it is")
     branch.add_argument(
         "--generation", type=_id, required=True, metavar="K", help="the last one taken over; 0: warm-up"
     )
-    branch.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder of the new run")
+    branch.add_argument("--out", type=to_path, required=True, metavar="FOLDER", help="folder of the new run")
     branch.add_argument("--user", help="who decides from then on, as in train (default: the run's own user)")
     branch.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
     _add_output(branch)
 
     export = commands.add_parser("export", help="copy a policy of a run to a file of its own")
-    export.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    export.add_argument("run", type=to_path, metavar="RUN", help="run folder")
     export.add_argument("--policy", type=_id, metavar="ID", help="default: the run's choice")
-    export.add_argument("--to", type=Path, required=True, metavar="FILE", help="a NumPy archive, .npz")
+    export.add_argument("--to", type=to_path, required=True, metavar="FILE", help="a NumPy archive, .npz")
     export.add_argument("--force", action="store_true", help="overwrite the file")
 
 
@@ -162,7 +182,7 @@ def _add_output(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_policy(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("policy", type=Path, metavar="RUN_OR_POLICY", help="run folder, or policy file")
+    parser.add_argument("policy", type=to_path, metavar="RUN_OR_POLICY", help="run folder, or policy file")
     parser.add_argument("--policy", dest="id", type=_id, metavar="ID", help="of a run folder (default: its choice)")
 
 
@@ -226,7 +246,8 @@ def _whole(least: int, most: int | None = None) -> Callable[[str], int]:
     return number
 
 
-_count, _id, _seed, _port, _size = _whole(1), _whole(0), _whole(0, 2**32 - 1), _whole(1, 65535), _whole(160, 4096)
+_count, _id = _whole(1, 2**31 - 1), _whole(0)  # compiled programs count in 32 bits
+_seed, _port, _size = _whole(0, 2**32 - 1), _whole(1, 65535), _whole(160, 4096)
 
 
 def _items(text: str) -> list[str]:

@@ -6,8 +6,9 @@ problems are reported at once, as a `ConfigError`. The letters P, E, T, K, L, M 
 
 import hashlib
 import json
+import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar, get_args, get_origin
 
@@ -16,9 +17,10 @@ import tomli_w
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 import envs
+from envs.names import did_you_mean, nearest
 from jmorl.decision.users import parse_user
 
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=2**31 - 1)]  # compiled programs count in 32 bits
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -165,7 +167,7 @@ class Config(Section):
     evaluation: EvaluationConfig = EvaluationConfig()
     search: SearchConfig = SearchConfig()
     checkpoints: CheckpointConfig = CheckpointConfig()
-    steps: Count = Field(2_500_000, description="budget of environment steps used for learning")
+    steps: Annotated[int, Field(ge=1)] = Field(2_500_000, description="budget of environment steps used for learning")
     reference_point: tuple[Finite, ...] = Field(
         (), description="of the reported hypervolume; empty: a tenth of the range below the first policies"
     )
@@ -284,17 +286,29 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
     """
     problems = []
     if preset not in PRESETS:
-        problems.append(f"preset: unknown preset {preset!r}; known: {', '.join(PRESETS)}")
+        known = f"known: {', '.join(PRESETS)}{did_you_mean(nearest(preset, PRESETS))}"
+        problems.append(f"preset: unknown preset {preset!r}; {known}")
     from_file: dict[str, Any] = {}
     if file is not None:
         try:
-            from_file = tomllib.loads(file.read_text())
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            from_file = _with_underscores(tomllib.loads(file.read_text(encoding="utf-8-sig")))
+        except (OSError, ValueError) as error:
             problems.append(f"config: cannot read {file}: {error}")
     chosen = _merged(from_file, overrides or {})
     env = chosen.get("env", Config.model_fields["env"].default)
     base = PRESETS.get(preset, {}).get(envs.plain_id(env), {}) if isinstance(env, str) else {}
     return _validated(Config, _merged(base, chosen), problems)
+
+
+def _with_underscores(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings whose names may be written as flags are: `warmup-iterations`. Raise ValueError for one given twice."""
+    plain: dict[str, Any] = {}
+    for written, value in settings.items():
+        name = written.replace("-", "_")
+        if name in plain:
+            raise ValueError(f"{name} is given twice")
+        plain[name] = _with_underscores(value) if isinstance(value, Mapping) else value
+    return plain
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -320,6 +334,21 @@ def _validated(kind: type[C], values: Mapping[str, Any], problems: list[str] | N
 def _sentence(error: Any) -> str:
     """One pydantic error as `section.field: what is wrong`."""
     where = ".".join(str(part) for part in error["loc"])
-    if error["type"] == "value_error":
-        return f"{where}: {error['ctx']['error']}"
+    match error["type"]:
+        case "value_error":
+            return f"{where}: {error['ctx']['error']}"
+        case "extra_forbidden":
+            return f"{where}: there is no such setting{did_you_mean(nearest(where, _setting_names(Config)))}"
+        case "literal_error":
+            known = re.findall("'([^']*)'", error["ctx"]["expected"])
+            near = did_you_mean(nearest(str(error["input"]), known))
+            return f"{where}: must be {error['ctx']['expected']}, not {error['input']!r}{near}"
     return f"{where}: {error['msg'][0].lower()}{error['msg'][1:]}, not {error['input']!r}"
+
+
+def _setting_names(section: type[Section], prefix: str = "") -> Iterator[str]:
+    """Every setting, as `ppo.epochs`, and every section."""
+    for name, field in section.model_fields.items():
+        yield f"{prefix}{name}"
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
+            yield from _setting_names(field.annotation, f"{prefix}{name}.")

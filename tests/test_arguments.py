@@ -52,7 +52,11 @@ def test_a_value_may_begin_with_a_minus_sign():
     ("arguments", "message"),
     [
         (["evaluate", "run", "--episodes", "2.5"], "argument --episodes: must be a whole number, not '2.5'"),
-        (["evaluate", "run", "--episodes", "-1"], "argument --episodes: must be at least 1, not -1"),
+        (["evaluate", "run", "--episodes", "-1"], "argument --episodes: must be from 1 to 2147483647, not -1"),
+        (
+            ["evaluate", "run", "--episodes", "99999999999999999999"],
+            "argument --episodes: must be from 1 to 2147483647, not 99999999999999999999",
+        ),
         (["evaluate", "run", "--seed", "4294967296"], "argument --seed: must be from 0 to 4294967295, not 4294967296"),
         (["play", "run", "--out", "a.gif", "--size", "big"], "argument --size: must be a whole number, not 'big'"),
         (["play", "run", "--out", "a.gif", "--size", "20"], "argument --size: must be from 160 to 4096, not 20"),
@@ -70,3 +74,20 @@ def test_a_number_that_is_none_is_explained(capsys, arguments, message):
         parse(arguments)
     assert left.value.code == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["show", "run", "--quite"], "there is no flag --quite (jmorl show --help says what there is)"),
+        (["train", "--quite"], "there is no flag --quite; did you mean '--quiet'?"),
+        (["train", "--agnts", "4"], "there is no flag --agnts; did you mean '--population.agents'?"),
+        (["train", "--popultion.agents=4"], "there is no flag --popultion.agents; did you mean '--population.agents'?"),
+        (["show", "run", "other"], "too many arguments: other"),
+    ],
+)
+def test_an_unknown_flag_names_the_nearest_in_one_line(capsys, arguments, message):
+    with pytest.raises(SystemExit) as left:
+        parse(arguments)
+    error = capsys.readouterr().err
+    assert left.value.code == 2 and error.startswith(f"jmorl: {message}") and error.count("\n") == 1

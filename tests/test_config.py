@@ -180,3 +180,50 @@ def test_the_learning_rate_falls_with_the_share_of_the_budget_that_is_used():
 def test_a_config_cannot_be_changed_in_place():
     with pytest.raises(ValueError, match="frozen"):
         Config().seed = 3
+
+
+@pytest.mark.parametrize(
+    ("overrides", "problem"),
+    [
+        ({"agents": 4}, "agents: there is no such setting; did you mean 'population.agents'?"),
+        ({"ppo": {"epoch": 4}}, "ppo.epoch: there is no such setting; did you mean 'ppo.epochs'?"),
+        ({"usr": "A"}, "usr: there is no such setting; did you mean 'user'?"),
+        ({"xyz": 1}, "xyz: there is no such setting"),
+        (
+            {"method": "interactve"},
+            "method: must be 'interactive' or 'pgmorl', not 'interactve'; did you mean",
+        ),
+        ({"env": "mo-mountaincar-v0"}, "; did you mean 'mo-mountaincarcontinuous-v0'?"),
+        ({"user": "weight=1,2"}, "terminal, script=FILE; did you mean 'weights'?"),
+        ({"user": "b"}, "script=FILE; did you mean 'B'?"),
+        ({"ppo": {"epochs": "9" * 20}}, "ppo.epochs: input should be less than or equal to 2147483647"),
+    ],
+)
+def test_what_is_unknown_or_too_large_says_what_would_do(overrides, problem):
+    with pytest.raises(ConfigError, match=re.escape(problem)) as error:
+        resolve(overrides=overrides)
+    assert len(error.value.problems) == 1
+
+
+def test_an_unknown_preset_names_the_nearest():
+    with pytest.raises(ConfigError, match="known: default, paper; did you mean 'paper'?"):
+        resolve("papr")
+
+
+def test_a_budget_of_steps_may_be_larger_than_what_programs_count():
+    assert resolve(overrides={"steps": str(10**11)}).steps == 10**11
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_a_file_may_begin_with_a_byte_order_mark_and_write_settings_as_flags_are(tmp_path, mark):
+    file = tmp_path / "config.toml"
+    file.write_bytes(mark + b"[population]\nwarmup-iterations = 3\n[ppo]\nrollout-steps = 64\nlearning_rate = 0.5\n")
+    config = resolve(file=file)
+    assert (config.population.warmup_iterations, config.ppo.rollout_steps, config.ppo.learning_rate) == (3, 64, 0.5)
+
+
+def test_a_setting_that_is_written_in_both_ways_is_refused(tmp_path):
+    file = tmp_path / "config.toml"
+    file.write_text("[population]\nwarmup-iterations = 3\nwarmup_iterations = 4\n")
+    with pytest.raises(ConfigError, match="cannot read .*: warmup_iterations is given twice"):
+        resolve(file=file)

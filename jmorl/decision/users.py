@@ -12,15 +12,17 @@ script=FILE                      the decisions of an earlier run, from its decis
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from envs.core import Objective
+from envs.names import did_you_mean, nearest
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.target import TargetUser
 from jmorl.decision.utility import USERS, UtilityUser, chebyshev_utility, linear_utility
+from jmorl.display.characters import to_path
 
 KNOWN = (
     f"{', '.join(USERS)}, weights=W1,W2,...[,chebyshev[=Z1,Z2,...]], target=Z1,Z2,...[,unscaled], terminal, script=FILE"
@@ -52,7 +54,8 @@ def parse_user(spec: str, objectives: int | None) -> Callable[[], DecisionMaker]
         return _scripted_user(value)
     if spec.strip() == "terminal":
         return _terminal_user
-    raise ValueError(f"unknown user {spec!r}; known: {KNOWN}")
+    near = did_you_mean(nearest(kind, (*USERS, "weights", "target", "terminal", "script")))
+    raise ValueError(f"unknown user {spec!r}; known: {KNOWN}{near}")
 
 
 def _paper_user(name: str, objectives: int | None) -> Callable[[], DecisionMaker]:
@@ -88,11 +91,12 @@ def _target_user(value: str, objectives: int | None) -> Callable[[], DecisionMak
 
 
 def _scripted_user(value: str) -> Callable[[], DecisionMaker]:
-    path = Path(value).expanduser()
-
     def make() -> DecisionMaker:
         from jmorl.decision.scripted import ScriptedUser
 
+        path = to_path(value)
+        with suppress(RuntimeError):  # there is no home folder for the `~`
+            path = path.expanduser()
         if not path.is_file():
             raise ValueError(f"there is no decision log {value!r}: {path.absolute()} is not a file")
         return ScriptedUser(path)

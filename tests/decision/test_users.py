@@ -119,3 +119,8 @@ def test_naming_users_loads_neither_plots_nor_clustering():
     code = f"import sys, jmorl.decision.users; print(sorted({heavy} & set(sys.modules)))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert loaded.stdout.strip() == "[]"
+
+
+def test_a_home_folder_that_there_is_none_of_is_no_traceback():
+    with pytest.raises(ValueError, match="there is no decision log '~nobody-of-this-name/x'"):
+        make_user("script=~nobody-of-this-name/x", ())
