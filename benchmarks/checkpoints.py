@@ -16,11 +16,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.speed import machine
 from jmorl.config import Config, resolve
+from jmorl.display.console import PlainConsole
 from jmorl.events import GenerationFinished
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.loop import run
@@ -43,7 +43,7 @@ def main() -> None:
     use_all_cpu_cores()
     report = {"machine": machine(), "cost": {env: cost(env, count) for env, count in GENERATIONS.items()}}
     RESULT.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    Console().print(table(report["cost"]))
+    PlainConsole().print(table(report["cost"]))
 
 
 def cost(env: str, generations: int) -> dict[str, Any]:

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.arms import add_arms, arms
 from jmorl.config import Config
 from jmorl.decision.utility import USERS
+from jmorl.display.console import PlainConsole
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.paper.analysis import generations_within, greatest_utility
 from jmorl.paper.plan import CHEETAH, ITEMS, USER_STEPS, Cell, Plan
@@ -48,7 +48,7 @@ def main() -> None:
         report = {"preset": options.preset, "set": options.set, "rows": rows}
         options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     for table in tables(rows):
-        Console().print(table)
+        PlainConsole().print(table)
 
 
 def _record(config: Config) -> RunRecord:

@@ -18,10 +18,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.speed import machine
+from jmorl.display.console import PlainConsole
 from jmorl.learning.devices import use_all_cpu_cores
 
 HERE = Path(__file__).parent
@@ -39,7 +39,7 @@ def main() -> None:
         for cache in BARS:
             report[cache] = waited(Path(folder), flags)
     options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    Console().print(table(report))
+    PlainConsole().print(table(report))
 
 
 def waited(folder: Path, flags: list[str]) -> dict[str, float]:
@@ -61,7 +61,7 @@ def waited(folder: Path, flags: list[str]) -> dict[str, float]:
 def commands(run: Path) -> list[list[str]]:
     """What `make demo` would run, but for the installation."""
     make = ["make", "--no-print-directory", "--dry-run", "demo", f"DEMO_OUT={run}"]
-    lines = subprocess.run(make, cwd=HERE.parent, check=True, capture_output=True, text=True).stdout.splitlines()
+    lines = subprocess.run(make, cwd=HERE.parent, check=True, capture_output=True, encoding="utf-8").stdout.splitlines()
     return [words for words in map(shlex.split, lines) if Path(words[0]).name == "jmorl"]
 
 

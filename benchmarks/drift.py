@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from envs.mountain_car import GOAL_POSITION, GRAVITY, LEFT_WALL, MAX_SPEED, POWER, RIGHT_WALL
+from jmorl.display.console import PlainConsole
 from jmorl.units import RunningUnits, in_running_units, initial_units
 
 GAMMA = 0.995  # of the value function, the scores and the units
@@ -159,7 +159,7 @@ def main() -> None:
         name = f"{6 - replaced} near-optimal" + (f", {replaced} standing still" if replaced else "")
         reached = ("never" if hit is None else str(hit) for hit in hits.values())
         table.add_row(name, *reached, *(str(deviations[g].round(1).tolist()) for g in (0, -1)))
-    Console().print(table)
+    PlainConsole().print(table)
 
 
 if __name__ == "__main__":

@@ -27,12 +27,12 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.car_values import ENVIRONMENT, FINEST, GRID_FORCES, Grid, action_values, optimal_values
 from benchmarks.trajectory_polish import polished_return
 from envs.mountain_car import CarState
+from jmorl.display.console import PlainConsole
 
 EPISODE_FORCES = 401
 
@@ -188,7 +188,7 @@ def main() -> None:
     fine, coarse = _front_on(FINEST, weights), _front_on(FINEST.halved, weights)
     rows = [_row(weight, fine, coarse, w) for w, weight in enumerate(weights)]
     report = _report(rows)
-    console = Console()
+    console = PlainConsole()
     console.print(_table(rows))
     for name, user in report["users"].items():
         console.print(f"user {name} ({user['weight_on_time']:g} on time): utility {user['utility']:.3f}")

@@ -19,7 +19,6 @@ import mujoco
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 from mujoco import rollout
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.cheetah_states import KINDS, Steps, cheetah_steps
@@ -29,6 +28,7 @@ from envs.mujoco_model import load_model
 from envs.physics import BodyState
 from envs.planar import PlanarPhysics, solver
 from envs.planar.step import forward
+from jmorl.display.console import PlainConsole
 from jmorl.learning.devices import usable_cores, use_all_cpu_cores
 
 RESULT = Path(__file__).parent / "physics.json"
@@ -56,7 +56,7 @@ def main() -> None:
             report["accuracy"][kind][dtype.__name__] = distribution(errors)
     report["newton_steps"] = newton_steps(steps)
     report["fixed_steps"] = [fixed_steps(steps, count) for count in FIXED_STEPS]
-    console = Console()
+    console = PlainConsole()
     for table in tables(report):
         console.print(table)
     RESULT.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")

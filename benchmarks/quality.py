@@ -17,7 +17,6 @@ from typing import Any
 
 import jax
 import numpy as np
-from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
@@ -26,6 +25,7 @@ from benchmarks.arms import add_arms, arms
 from benchmarks.exact_front import exact_front
 from jmorl.config import Config
 from jmorl.decision.utility import USERS
+from jmorl.display.console import PlainConsole
 from jmorl.events import GenerationFinished, RunFinished
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.learning.moppo import MOPPO
@@ -45,14 +45,14 @@ def main() -> None:
     use_all_cpu_cores()
     configs = list(arms(options, ENVIRONMENT))
     rows: list[dict[str, Any]] = []
-    for config in track(configs, console=Console(stderr=True), disable=not sys.stderr.isatty()):
+    for config in track(configs, console=PlainConsole(stderr=True), disable=not sys.stderr.isatty()):
         rows += _judged(config, options.users if config.method == "pgmorl" else [config.user])
         if options.verbose:
             print(json.dumps(rows[-1]), flush=True)
         report = {"preset": options.preset, "set": options.set, "rows": rows}  # after every run: none is lost
         options.out.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    Console().print(_table(rows))
-    Console().print(_summary(rows))
+    PlainConsole().print(_table(rows))
+    PlainConsole().print(_summary(rows))
 
 
 def _options() -> argparse.Namespace:

@@ -23,11 +23,11 @@ from typing import Any
 
 import jax
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 import envs
 from jmorl.config import resolve
+from jmorl.display.console import PlainConsole
 from jmorl.events import Compiled, GenerationFinished
 from jmorl.learning.devices import usable_cores, use_all_cpu_cores
 from jmorl.learning.population import Population
@@ -62,7 +62,7 @@ def main() -> None:
         rate = report["peer"]["all_generations"]["steps_per_second"]
         for measured in report["runs"].values():
             measured["times_the_peer"] = round(measured["steps_per_second"] / rate, 1)
-    console = Console()
+    console = PlainConsole()
     for table in tables(report):
         console.print(table)
     result = HERE / f"speed-{options.env}.json"
@@ -224,13 +224,15 @@ def peer(env: str) -> dict[str, Any]:
     }
     flags = [str(part) for flag in sizes.items() for part in flag]
     command = [PEER_PYTHON, HERE / "peer" / "pgmorl.py", *flags]
-    result: dict[str, Any] = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    result: dict[str, Any] = json.loads(
+        subprocess.run(command, check=True, capture_output=True, encoding="utf-8").stdout
+    )
     return result
 
 
 def _cpu_name() -> str:
     info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.exists() else []
+    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor()
 

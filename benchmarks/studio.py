@@ -23,12 +23,12 @@ from typing import Any
 import httpx
 import numpy as np
 from playwright.sync_api import Page
-from rich.console import Console
 from rich.table import Table
 
 from benchmarks.speed import machine
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
+from jmorl.display.console import PlainConsole
 from jmorl.search.policy import Policy
 from jmorl.state import Prospect
 from jmorl.storage.stored_run import read_run
@@ -214,7 +214,7 @@ def main() -> None:
         "question_seconds": {"median": statistics.median(waits), "most": max(waits)},
         "serving": {"seconds": seconds, "share": shares},
     }
-    RESULTS.write_text(json.dumps(results, indent=2) + "\n")
+    RESULTS.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
     table = Table("what", "median", "most")
     table.add_row(f"click, with {POLICIES} policies", f"{statistics.median(clicks):.0f} ms", f"{max(clicks):.0f} ms")
     table.add_row(
@@ -222,7 +222,7 @@ def main() -> None:
     )
     for way, share in shares.items():
         table.add_row(f"training, {way}", f"{100 * share:+.1f} %", "")
-    Console().print(table)
+    PlainConsole().print(table)
 
 
 if __name__ == "__main__":

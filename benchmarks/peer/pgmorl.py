@@ -110,7 +110,7 @@ def timed(name: str, phase: Callable[..., Any], record: list[Phase]) -> Callable
 def run(sizes: argparse.Namespace) -> list[Phase]:
     """Every phase of one run, in order. The library's own printing goes nowhere."""
     record: list[Phase] = []
-    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+    with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
         algorithm = pgmorl(sizes)
         # Set on the object, under the names Python gives to private methods: the class stays as published.
         for name, method in (

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 
-from rich.console import Console
-
 from envs.core import Objective
 from jmorl.decision.protocol import (
     Adjust,
@@ -16,6 +14,7 @@ from jmorl.decision.protocol import (
     Question,
 )
 from jmorl.decision.terminal_view import show_front, show_points
+from jmorl.display.console import PlainConsole
 
 LONGEST_NUMBER = 9  # digits
 POLICY_HELP = """\
@@ -41,8 +40,8 @@ class TerminalUser(DecisionMaker):
     choice to end the run with.
     """
 
-    def __init__(self, console: Console | None = None, read: Callable[[str], str] = input):
-        self.console = console or Console()
+    def __init__(self, console: PlainConsole | None = None, read: Callable[[str], str] = input):
+        self.console = console or PlainConsole()
         self.read = read
 
     def answer(self, question: Question) -> Answer:
@@ -80,8 +79,7 @@ class TerminalUser(DecisionMaker):
             return "?"
 
     def _say(self, sentence: str) -> None:
-        # What people type must not be taken for rich's markup.
-        self.console.print(sentence, markup=False, highlight=False)
+        self.console.print(sentence)
 
 
 def policy_reply(question: Question, line: str) -> Answer | int | str:

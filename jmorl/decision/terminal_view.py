@@ -3,24 +3,20 @@
 from collections.abc import Mapping
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion, Question
-from jmorl.display.fronts import front_scatter, front_table, plain_table, stacked_label
-from jmorl.display.text import number_format, plural
+from jmorl.display.console import PlainConsole
+from jmorl.display.fronts import front_scatter, front_table, stacked_label
+from jmorl.display.tables import PlainTable
+from jmorl.display.text import front_question, number_format, plural
 
 PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
 
-def show_front(console: Console, question: Question, by: int) -> None:
+def show_front(console: PlainConsole, question: Question, by: int) -> None:
     """The question, its front with the most of objective `by` first, and a plot of it."""
-    policies = plural(len(question.front), "policy")
-    if question.purpose == "final":
-        heading = f"The run is over. Which of these {policies} is its result?"
-    else:
-        heading = f"Generation {question.generation}: which of these {policies} do you prefer?"
+    heading = front_question(question.purpose, question.generation, len(question.front))
     table = front_table(
         question.front, question.objectives, previous_id=question.previous, by=by, bounds=question.bounds
     )
@@ -30,7 +26,7 @@ def show_front(console: Console, question: Question, by: int) -> None:
     show_plot(console, question.objectives, question.values, marks, legend)
 
 
-def show_points(console: Console, question: PointQuestion) -> None:
+def show_points(console: PlainConsole, question: PointQuestion) -> None:
     """The question, its points, and a plot of them among the policies still reachable."""
     state = question.state
     iterations = f"{plural(state.iterations_left, 'iteration')} left"
@@ -41,11 +37,11 @@ def show_points(console: Console, question: PointQuestion) -> None:
     show_plot(console, question.objectives, state.values[state.reachable], marks, legend)
 
 
-def points_table(question: PointQuestion) -> Table:
+def points_table(question: PointQuestion) -> PlainTable:
     """One row per point: what can still come of it, how near the front it is, and the policy it heads for."""
     formats = [number_format(column) for column in question.state.values.T]
     ranges = (f"{stacked_label(objective)}\nworst to best" for objective in question.objectives)
-    table = plain_table("point", *ranges, "closeness", "policies", "heads for")
+    table = PlainTable("point", *ranges, "closeness", "policies", "heads for")
     for number, point in enumerate(question.points, start=1):
         cells = [
             f"{worst:{fmt}} to {best:{fmt}}" for worst, best, fmt in zip(point.value, point.best, formats, strict=True)
@@ -59,7 +55,7 @@ def points_table(question: PointQuestion) -> Table:
 
 
 def show_plot(
-    console: Console,
+    console: PlainConsole,
     objectives: tuple[Objective, ...],
     values: np.ndarray,  # [N, M]
     marks: Mapping[str, np.ndarray],  # character: point [M]
@@ -69,10 +65,10 @@ def show_plot(
     if len(objectives) == 2:
         plot = front_scatter(objectives, values, marks, min(console.width, PLOT_WIDTH), PLOT_HEIGHT)
         console.print(plot, soft_wrap=True)
-        console.print(legend, markup=False, highlight=False)
+        console.print(legend)
 
 
-def _show(console: Console, heading: str, table: Table) -> None:
+def _show(console: PlainConsole, heading: str, table: PlainTable) -> None:
     console.print()
-    console.print(heading, style="bold", markup=False, highlight=False)
+    console.print(heading, style="bold")
     console.print(table)

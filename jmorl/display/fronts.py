@@ -4,13 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import plotille
-from rich import box
-from rich.console import JustifyMethod
-from rich.table import Table
 from rich.text import Text
 
 from envs.core import Objective
 from jmorl.display.limits import around, core, inside
+from jmorl.display.tables import PlainTable
 from jmorl.display.text import number_format, plural
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy, values_of
@@ -27,7 +25,7 @@ def front_table(
     previous_id: int | None = None,
     by: int = 0,
     bounds: np.ndarray | None = None,
-) -> Table:
+) -> PlainTable:
     """One row for each of at least one policy, the most of objective `by` first.
 
     Values are in raw units, with their standard deviation over the evaluation episodes; weights are those the
@@ -38,7 +36,7 @@ def front_table(
     stds = np.stack([policy.std for policy in policies])
     bounded = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
     scores = [_scores(*column) for column in zip(values.T, stds.T, strict=True)]
-    table = plain_table("policy", *map(stacked_label, objectives), "weights", "gen", "")
+    table = PlainTable("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
         notes = {policy.id == previous_id: "last choice", policy.id == chosen_id: "chosen"}
@@ -82,23 +80,6 @@ def front_scatter(
     plot = figure.show().replace(EMPTY_CELL, " ")
     left_out = f"\n({plural(int((~near).sum()), 'policy')} far out)" if not near.all() else ""
     return Text(plot + left_out, no_wrap=True)
-
-
-def plain_table(*headings: str, title: str | None = None) -> Table:
-    """A table without vertical lines, as narrow as its content; only columns of notes, without heading, start left."""
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        show_edge=False,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    for heading in headings:
-        justify: JustifyMethod = "right" if heading else "left"
-        table.add_column(Text(heading), justify=justify, header_style="", overflow="fold")
-    return table
 
 
 def stacked_label(objective: Objective) -> str:

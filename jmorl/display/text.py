@@ -19,9 +19,9 @@ REASONS = {  # why a run ended
 def number_format(values: np.ndarray, digits: int = 3) -> str:
     """A format that shows the range of most of the values [N] with so many significant digits.
 
-    NaN is ignored, and values far out do not count; without a range, the distance to 0 does.
+    NaN and infinity are ignored, and values far out do not count; without a range, the distance to 0 does.
     """
-    present = values[~np.isnan(values)]
+    present = values[np.isfinite(values)]
     near = present[core(present[:, None])]
     extent = (np.ptp(near) or abs(near[0]) or 1.0) if len(near) else 1.0
     if len(present) and np.abs(present).max() >= 1e9 or extent < 1e-6:
@@ -61,6 +61,15 @@ def plural(count: int, noun: str) -> str:
     if count == 1:
         return f"1 {noun}"
     return f"{count} {noun[:-1]}ies" if noun.endswith("y") else f"{count} {noun}s"
+
+
+def front_question(purpose: str, generation: int, policies: int) -> str:
+    """The question about a front of so many policies; `purpose` and `generation` are a Question's."""
+    if purpose == "final":
+        which = f"Which of these {policies} policies is its result?" if policies > 1 else "Is this policy its result?"
+        return f"The run is over. {which}"
+    which = f"which of these {policies} policies do you prefer?" if policies > 1 else "do you go on with this policy?"
+    return f"Generation {generation}: {which}"
 
 
 def objective_label(objective: Objective) -> str:

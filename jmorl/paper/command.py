@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
+from jmorl.display.console import PlainConsole
 from jmorl.display.text import duration, short_count
 from jmorl.events import Event, GenerationFinished, RunFinished
 from jmorl.paper.naming import named
@@ -32,7 +31,7 @@ def make_paper(
     Up to `together` runs are made in one program. `only` may have "targets": runs on other seeds, from which targets
     for HalfCheetah are proposed.
     """
-    console = Console()
+    console = PlainConsole()
     plan = Plan(quick, tuple(seeds) if seeds else None)
     out = out or Path("runs/paper-quick" if quick else "benchmarks/paper")
     places = Places(out / "records", work or (out / "work" if quick else Path("runs/paper")))
@@ -48,11 +47,11 @@ def make_paper(
         _make_all(parts, places, together, console)
     if only and "targets" in only:
         proposed = propose(CHEETAH, known(plan.pilots(CHEETAH), places))
-        console.print(proposed, soft_wrap=True, highlight=False)
+        console.print(proposed, soft_wrap=True)
     if items:
         cells = distinct(cell for part in parts for cell in part.cells)
         path = write_report(out, Scope(plan, items, units), known(cells, places))
-        console.print(f"report: {path}", soft_wrap=True, highlight=False)
+        console.print(f"report: {path}", soft_wrap=True)
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class _Part:
     cells: Sequence[Cell]
 
 
-def _make_all(parts: Sequence[_Part], places: Places, together: int, console: Console) -> None:
+def _make_all(parts: Sequence[_Part], places: Places, together: int, console: PlainConsole) -> None:
     """Every part's missing runs. What two parts share is made with the first."""
     with StopSignals("stopping after this generation; the same command goes on from there") as stop:
         for part in parts:
@@ -79,10 +78,10 @@ def _make_all(parts: Sequence[_Part], places: Places, together: int, console: Co
             _say(console, f"{name}: {len(todo)} runs, {short_count(steps)} steps, {spent}" if todo else f"{name}: done")
 
 
-def _make_some(cells: Sequence[Cell], places: Places, name: str, console: Console, stop: StopSignals) -> int:
+def _make_some(cells: Sequence[Cell], places: Places, name: str, console: PlainConsole, stop: StopSignals) -> int:
     """Make runs together, with a line that changes on a terminal, and one for each that stays. Returns their steps."""
     started = time.monotonic()
-    with console.status(f"{name}: {cells[0].key}") as status:
+    with console.status(f"{name}: {cells[0].key}", spinner="line") as status:  # which every encoding has
 
         def watch(cell: Cell, event: Event) -> None:
             if isinstance(event, GenerationFinished):
@@ -100,5 +99,5 @@ def _make_some(cells: Sequence[Cell], places: Places, name: str, console: Consol
     return sum(record.total_steps for record in records)
 
 
-def _say(console: Console, text: str) -> None:
-    console.print(text, soft_wrap=True, highlight=False)
+def _say(console: PlainConsole, text: str) -> None:
+    console.print(text, soft_wrap=True)

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
@@ -16,6 +16,7 @@ from rich.text import Text
 
 from envs.core import Objective
 from jmorl.config import Config
+from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_scatter, front_table
 from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
 from jmorl.events import Event, RunFinished
@@ -28,6 +29,7 @@ WIDTH = 100  # columns of the panel at most
 FACT_LINES = 13  # of the screen that are not for the front
 PLOT_LINES = 18  # of the front at most
 LEAST_LINES = 9  # less is no plot
+LEAST_BAR = 8  # columns, with the gaps beside it; less is no bar
 
 
 class LiveView(Watcher):
@@ -41,7 +43,7 @@ class LiveView(Watcher):
         self,
         config: Config,
         objectives: tuple[Objective, ...],
-        console: Console,
+        console: PlainConsole,
         clock: Callable[[], float] = time.monotonic,
     ):
         self.config = config
@@ -80,6 +82,11 @@ class LiveView(Watcher):
         """One that has drawn nothing yet: one that was stopped would draw over what came since."""
         return Live(get_renderable=self.panel, console=self.console, refresh_per_second=REFRESH_RATE)
 
+    @property
+    def _room(self) -> int:
+        """Columns within the panel."""
+        return min(self.console.width, WIDTH) - 4
+
     def panel(self) -> Panel:
         """The picture of this moment."""
         timeline, now = self.timeline, self.clock()
@@ -87,26 +94,29 @@ class LiveView(Watcher):
         if timeline.finished and (len(self.objectives) == 2 or not timeline.result):
             parts += self._front(timeline)  # at the end of a run the table of the result is there anyway
         config = self.config
-        title = f"{config.method} · {config.env} · user {config.user} · seed {config.seed}"
-        return Panel(Group(*parts), title=Text(title), title_align="left", width=min(self.console.width, WIDTH))
+        title = self.console.render_str(f"{config.method}, {config.env}, user {config.user}, seed {config.seed}")
+        return Panel(Group(*parts), title=title, title_align="left", width=self._room + 4)
 
-    def _bar(self, timeline: Timeline, now: float) -> Table:
-        """What is going on, and how much of the budget is used."""
+    def _bar(self, timeline: Timeline, now: float) -> RenderableType:
+        """What is going on, and how much of the budget is used; without a bar where the screen is too narrow."""
+        steps, total = timeline.steps(now), timeline.total_steps
+        phase, used = Text(_phase(timeline), "bold"), f"{short_count(steps)} of {short_count(total)} steps"
+        if len(phase) + LEAST_BAR + len(used) > self._room:
+            return Group(phase, used)
         row = Table.grid(expand=True, padding=(0, 2, 0, 0))
         row.add_column(no_wrap=True)
         row.add_column(ratio=1)
         row.add_column(no_wrap=True)
-        steps, total = timeline.steps(now), timeline.total_steps
         unknown = timeline.finished is None
         bar = ProgressBar(total, steps, pulse=unknown, animation_time=now)
-        row.add_row(Text(_phase(timeline), "bold"), bar, f"{short_count(steps)} of {short_count(total)} steps")
+        row.add_row(phase, bar, used)
         return row
 
     def _facts(self, timeline: Timeline, now: float) -> Table:
         grid = Table.grid(padding=(0, 2, 0, 0))
         grid.add_column(no_wrap=True, style="dim")
         for name, text in self._named_facts(timeline, now):
-            grid.add_row(name, Text(text))
+            grid.add_row(name, text)
         return grid
 
     def _named_facts(self, timeline: Timeline, now: float) -> Iterator[tuple[str, str]]:
@@ -143,7 +153,7 @@ class LiveView(Watcher):
         if len(self.objectives) > 2:
             return ["", front_table(members, self.objectives, previous_id=chosen.id if chosen else None)]
         marks, legend = ({"x": chosen.values}, "o: the front, x: the last choice") if chosen else ({}, "o: the front")
-        plot = front_scatter(self.objectives, values_of(members), marks, min(self.console.width, WIDTH) - 4, lines)
+        plot = front_scatter(self.objectives, values_of(members), marks, self._room, lines)
         return ["", plot, Text(legend, "dim")]
 
 

@@ -2,15 +2,14 @@
 
 import sys
 
-from rich.console import Console
-
 from envs.core import Objective
 from jmorl.config import Config
+from jmorl.display.console import PlainConsole
 from jmorl.report.live import LiveView
 from jmorl.report.watchers import Json, Lines, Quiet, Watcher
 
 
-def watcher(kind: str, config: Config, objectives: tuple[Objective, ...], console: Console) -> Watcher:
+def watcher(kind: str, config: Config, objectives: tuple[Objective, ...], console: PlainConsole) -> Watcher:
     """Who shows the events of a run: `with watcher(...) as watching: watching.show(event)`.
 
     "live" redraws a view of the run on a terminal. "lines" is one for each event. "json" goes to standard output,

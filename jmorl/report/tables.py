@@ -11,7 +11,8 @@ from rich.text import Text
 import envs
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
-from jmorl.display.fronts import front_table, plain_table, stacked_label
+from jmorl.display.fronts import front_table, stacked_label
+from jmorl.display.tables import PlainTable
 from jmorl.display.text import REASONS, duration, number_format, objective_label, plural, short_count
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.search.policy import values_of
@@ -23,11 +24,11 @@ def run_tables(run: StoredRun) -> list[RenderableType]:
     decisions = [decisions_table(run)] if run.decisions else []
     front = front_table(run.front, run.objectives, run.chosen.id if run.chosen else None)
     front.title = "Final front" if run.result else "Front so far"
-    tables = [run_heading(run), metrics_table(run), *decisions, front]
+    tables: list[RenderableType] = [run_heading(run), metrics_table(run), *decisions, front]
     return [part for table in tables for part in (table, "")]
 
 
-def run_heading(run: StoredRun) -> Table:
+def run_heading(run: StoredRun) -> RenderableType:
     """What was run, on what, for how long, and how it ended."""
     config, device = run.config, run.manifest["device"]
     steps, seconds = run.metrics["steps"][-1], run_seconds(run)
@@ -44,7 +45,7 @@ def run_heading(run: StoredRun) -> Table:
     }
     grid = Table.grid(padding=(0, 2, 0, 0))
     for name, value in rows.items():
-        grid.add_row(Text(name, "bold"), Text(value))
+        grid.add_row(Text(name, "bold"), value)
     return grid
 
 
@@ -53,7 +54,7 @@ def run_seconds(run: StoredRun) -> float:
     return float(sum(run.metrics[f"{part}_seconds"].sum() for part in ("select", "train", "evaluate")))
 
 
-def metrics_table(run: StoredRun) -> Table:
+def metrics_table(run: StoredRun) -> PlainTable:
     """One row for each generation; what all generations lack, as a utility for a person, has no column.
 
     The model error is that of the predictions, in units of the archive's range.
@@ -75,17 +76,17 @@ def metrics_table(run: StoredRun) -> Table:
         "time\nin s": _texts(seconds, ".1f"),
     }
     present = {heading: cells for heading, cells in columns.items() if any(cells)}
-    table = plain_table(*present, title="Generations; 0 is the warm-up")
+    table = PlainTable(*present, title="Generations; 0 is the warm-up")
     for row in zip(*present.values(), strict=True):
         table.add_row(*row)
     return table
 
 
-def decisions_table(run: StoredRun) -> Table:
+def decisions_table(run: StoredRun) -> PlainTable:
     """One row for each answer, with the policy it prefers."""
     formats = [number_format(column) for column in values_of(run.front).T]
     headings = map(stacked_label, run.objectives)
-    table = plain_table("gen", "question", "among", "policy", *headings, "", title="Decisions")
+    table = PlainTable("gen", "question", "among", "policy", *headings, "", title="Decisions")
     for record in run.decisions:
         if isinstance(record, DecisionRecord):
             cells = [f"{value:{fmt}}" for value, fmt in zip(record.values, formats, strict=True)]
@@ -96,11 +97,11 @@ def decisions_table(run: StoredRun) -> Table:
     return table
 
 
-def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Table:
+def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> PlainTable:
     """What fresh episodes [N] of a stored policy with this header brought, beside its score in the run."""
     undiscounted = np.asarray(returns.undiscounted, float)
     spread = "std.\nerror", "std.\ndev.", "\nworst", "\nbest"
-    table = plain_table("\nobjective", "\nmean", *spread, "in its\nrun", "dis-\ncounted")
+    table = PlainTable("\nobjective", "\nmean", *spread, "in its\nrun", "dis-\ncounted", words=["\nobjective"])
     table.title = f"Policy {header['id']} in {plural(len(undiscounted), 'fresh episode')} of {header['environment']}"
     for index, fields in enumerate(header["objectives"]):
         column = undiscounted[:, index]
@@ -112,15 +113,14 @@ def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Tabl
         table.add_row(objective_label(Objective(**fields)), f"{column.mean():{fmt}}", error, *texts)
     lengths = np.asarray(returns.length)
     table.caption = f"Episodes of {lengths.min()} to {lengths.max()} steps, {lengths.mean():.1f} on average."
-    table.caption_justify = "left"
     return table
 
 
-def comparison_table(header: Mapping[str, Any], ours: np.ndarray, theirs: np.ndarray, z: np.ndarray) -> Table:
+def comparison_table(header: Mapping[str, Any], ours: np.ndarray, theirs: np.ndarray, z: np.ndarray) -> PlainTable:
     """Returns [N, M] here and in MO-Gymnasium, side by side; `z` [M] is the difference in standard errors."""
     spread = "std.\ndev.", "std.\nerror"
     headings = "jmorl\nmean", *spread, "MO-Gym.\nmean", *spread, "difference in\nstd. errors"
-    table = plain_table("\nobjective", *headings)
+    table = PlainTable("\nobjective", *headings, words=["\nobjective"])
     table.title = f"Policy {header['id']} in {header['environment']}, {plural(len(ours), 'fresh episode')} each"
     for index, fields in enumerate(header["objectives"]):
         cells = [cell for returns in (ours, theirs) for cell in _mean_and_errors(returns[:, index])]
@@ -134,11 +134,10 @@ def _mean_and_errors(column: np.ndarray) -> list[str]:
     return [f"{column.mean():{fmt}}", *_texts(np.array([deviation, deviation / np.sqrt(len(column))]), ".3g")]
 
 
-def environments_table() -> Table:
+def environments_table() -> PlainTable:
     """One row for each environment: what it optimises, and its sizes."""
-    table = plain_table("\nenvironment", "\nobjectives", "obser-\nvations", "\nactions", "time\nlimit")
-    for column in table.columns[:2]:
-        column.justify = "left"
+    texts = "\nenvironment", "\nobjectives"
+    table = PlainTable(*texts, "obser-\nvations", "\nactions", "time\nlimit", words=texts)
     for name in envs.ids():
         environment = envs.make(name)
         objectives = "\n".join(map(objective_label, environment.objectives))

@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Any, Self, TextIO
 
 import numpy as np
-from rich.console import Console
 
 from envs.core import Objective
 from jmorl.config import Config
+from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_table
 from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
@@ -50,13 +50,13 @@ class Quiet(Watcher):
 class Lines(Watcher):
     """One line for every event, and the final front as a table."""
 
-    def __init__(self, config: Config, objectives: tuple[Objective, ...], console: Console):
+    def __init__(self, config: Config, objectives: tuple[Objective, ...], console: PlainConsole):
         self.objectives = objectives
         self.console = console
         self.generations = Timeline(config, since=0.0).generations
 
     def show(self, event: Event) -> None:
-        self.console.print(self._line(event), markup=False, highlight=False, soft_wrap=True)
+        self.console.print(self._line(event), soft_wrap=True)
         if isinstance(event, RunFinished):
             show_result(self.console, event, self.objectives)
 
@@ -189,7 +189,7 @@ def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
     return f"{choice}; bounds {bounds}{more}"
 
 
-def show_result(console: Console, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
+def show_result(console: PlainConsole, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
     """The final front, with the chosen policy marked."""
     table = front_table(event.state.archive.members, objectives, event.chosen.id)
     table.title = "Final front"

@@ -77,6 +77,7 @@ def _commit() -> str | None:
     """The commit of the source tree, with a mark if it was changed since; None outside a repository."""
     command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=40"]
     try:
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
+        found = subprocess.run(command, capture_output=True, encoding="utf-8", check=True, timeout=10)
+        return found.stdout.strip()
+    except (OSError, ValueError, subprocess.SubprocessError):
         return None

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from jmorl.display.text import duration, number_format, plural, short_count, values_in_words
+from jmorl.display.text import duration, front_question, number_format, plural, short_count, values_in_words
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
 from jmorl.state import Prospect
@@ -76,10 +76,7 @@ def heading(view: View, selection: Selection) -> str:
         label = view.objectives[selection.more_of].label
         return f"{plural(len(more), 'policy')} better in {label} than policy {selection.than}"
     if question:
-        policies = plural(len(question.front), "policy")
-        if question.purpose == "final":
-            return f"The run is over. Which of these {policies} is its result?"
-        return f"Generation {question.generation}: which of these {policies} do you prefer?"
+        return front_question(question.purpose, question.generation, len(question.front))
     if view.result:
         return f"The result is policy {view.result.id}: {scores(view, view.result)}"
     if view.timeline is None:

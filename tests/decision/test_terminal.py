@@ -1,16 +1,17 @@
 """The person at a terminal: every command, every mistake, and what is shown."""
 
 import io
+import re
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from envs.core import Objective
 from jmorl.decision import enautilus as en
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.protocol import Adjust, Answer, Back, Choose, PointQuestion
 from jmorl.decision.terminal import TerminalUser
+from jmorl.display.console import PlainConsole
 
 # Policies 10, 11, 12 in the tests below.
 VALUES = [[-70, -40], [-66.25, -57], [-100, -20]]
@@ -24,7 +25,7 @@ class Session:
         self.remaining = list(lines)
         self.prompts: list[str] = []
         self.file = io.StringIO()
-        self.user = TerminalUser(Console(file=self.file, width=width), self.read)
+        self.user = TerminalUser(PlainConsole(file=self.file, width=width), self.read)
 
     def read(self, prompt: str) -> str:
         self.prompts.append(prompt)
@@ -221,7 +222,9 @@ def test_other_numbers_of_objectives_have_a_table_and_no_plot(ask):
 def test_nothing_is_cut_off_in_a_narrow_terminal(ask):
     session = Session("10", width=40)
     session.user.answer(ask([[1.25, 2.5, 3.75], [3.5, 2.25, 1.5]]))
-    assert "…" not in session.output
+    assert "…" not in session.output and max(map(len, session.output.splitlines())) <= 40
+    numbers = {float(word) for word in session.output.split() if re.fullmatch(r"\d+\.\d+", word)}
+    assert {1.25, 2.5, 3.75, 3.5, 2.25, 1.5} <= numbers
 
 
 @pytest.mark.parametrize("values", [[[5, 5]], [[5, 5], [5, 5]], [[0, 0]], [[1e-9, 1e12], [2e-9, 1e12]]])
@@ -323,3 +326,12 @@ def test_a_whole_dialogue(front_of, objectives_of):
     chosen = run_enautilus(front_of(HAND), objectives_of(2), session.user.choose_point, 2, 2, 1)
     assert chosen.id in (10, 11, 12)
     assert session.output.count("2 iterations left") == 3
+
+
+def test_a_front_of_one_policy_is_no_choice_among_policies(ask):
+    session = Session("10")
+    session.user.answer(ask([[1, 2]], generation=4))
+    assert "Generation 4: do you go on with this policy?" in session.output
+    session = Session("10")
+    session.user.answer(ask([[1, 2]], purpose="final"))
+    assert "The run is over. Is this policy its result?" in session.output

@@ -4,9 +4,9 @@ import io
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from envs.core import Objective
+from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_scatter, front_table
 from jmorl.search.policy import Policy
 
@@ -23,7 +23,7 @@ def policies(values, std=0.5):
 
 def printed(renderable, width=80, **terminal):
     file = io.StringIO()
-    Console(file=file, width=width, **terminal).print(renderable)
+    PlainConsole(file=file, width=width, **terminal).print(renderable)
     return file.getvalue()
 
 

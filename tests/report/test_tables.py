@@ -4,16 +4,17 @@ import io
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 import envs
+from jmorl.display.console import PlainConsole
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.report.tables import comparison_table, environments_table, evaluation_table, run_tables
+from jmorl.search.policy import values_of
 
 
 def printed(renderables, width=80):
     file = io.StringIO()
-    console = Console(file=file, width=width)
+    console = PlainConsole(file=file, width=width)
     for renderable in renderables:
         console.print(renderable)
     return file.getvalue()
@@ -34,7 +35,7 @@ def section(text, title):
     return found
 
 
-@pytest.mark.parametrize("width", [80, 100, 140])
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 140])
 @pytest.mark.parametrize("kinds", [{}, {"objectives": 3}, {"has_utility": False}, {"interactive": False}])
 def test_everything_fits(make_run, width, kinds):
     text = printed(run_tables(make_run(**kinds)), width)
@@ -44,6 +45,9 @@ def test_everything_fits(make_run, width, kinds):
     run = make_run(**kinds)
     assert len(section(text, "Generations")) == 11
     assert len(section(text, "Final front")) == len(run.front)
+    words = set(text.split())
+    assert {f"{volume:.0f}" for volume in run.metrics["hypervolume"]} <= words
+    assert {f"{value:.1f}" for value in values_of(run.front)[:, 0]} <= words
 
 
 def test_the_heading_sums_the_run_up(make_run):

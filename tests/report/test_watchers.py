@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from jmorl.config import resolve
+from jmorl.display.console import PlainConsole
 from jmorl.events import GenerationFinished, Resumed
 from jmorl.report.live import REFRESH_RATE, LiveView
 from jmorl.report.progress import watcher
@@ -18,7 +18,7 @@ from tests.report.conftest import OBJECTIVES
 
 def shown(kind, events, width=80, height=40, objectives=2, **config):
     file = io.StringIO()
-    console = Console(file=file, width=width, height=height)
+    console = PlainConsole(file=file, width=width, height=height)
     with watcher(kind, resolve(overrides=config), OBJECTIVES[:objectives], console) as watching:
         for event in events:
             watching.show(event)
@@ -100,14 +100,14 @@ def test_quiet_says_nothing(make_events, capsys):
 
 def test_an_unknown_kind_is_refused():
     with pytest.raises(ValueError, match="'loud'; known: live, lines, json, quiet"):
-        watcher("loud", resolve(), OBJECTIVES[:2], Console())
+        watcher("loud", resolve(), OBJECTIVES[:2], PlainConsole())
 
 
 @pytest.mark.parametrize("objectives", [2, 3])
 @pytest.mark.parametrize(("width", "height"), [(80, 24), (100, 40), (140, 60)])
 def test_every_frame_of_a_live_view_fits_on_the_screen(make_events, width, height, objectives):
     now = iter(range(10_000))
-    console = Console(file=io.StringIO(), width=width, height=height)
+    console = PlainConsole(file=io.StringIO(), width=width, height=height)
     view = LiveView(resolve(), OBJECTIVES[:objectives], console, clock=lambda: float(next(now)))
     for event in make_events(objectives=objectives, outliers=0):
         view.timeline = view.timeline.after(event, float(next(now)))
@@ -119,7 +119,7 @@ def test_every_frame_of_a_live_view_fits_on_the_screen(make_events, width, heigh
 
 def test_a_live_view_tells_where_the_run_stands(make_events):
     file = io.StringIO()
-    console = Console(file=file, width=90, height=40)
+    console = PlainConsole(file=file, width=90, height=40)
     clock = [0.0]
     view = LiveView(resolve(), OBJECTIVES[:2], console, clock=lambda: clock[0])
     for event in make_events()[:5]:  # up to the second choice
@@ -161,7 +161,7 @@ class Screen(io.StringIO):
         return super().write(text)
 
     def watched(self, **config):
-        console = Console(file=self, width=80, height=40, force_terminal=True, _environ={"TERM": "xterm"})
+        console = PlainConsole(file=self, width=80, height=40, force_terminal=True, _environ={"TERM": "xterm"})
         return watcher("live", resolve(overrides=config), OBJECTIVES[:2], console)
 
 
@@ -200,3 +200,16 @@ def test_a_live_view_stays_while_an_artificial_user_is_asked(make_events):
             watching.show(event)
         with watching.asking():
             assert all(screen.frames.acquire(timeout=20) for _ in range(3))
+
+
+@pytest.mark.parametrize("width", [40, 60, 100])
+def test_a_live_view_says_how_far_the_run_is_on_every_screen(make_events, width):
+    file = io.StringIO()
+    console = PlainConsole(file=file, width=width, height=60)
+    view = LiveView(resolve(), OBJECTIVES[:2], console, clock=lambda: 0.0)
+    for event in make_events()[:5]:
+        view.timeline = view.timeline.after(event, 0.0)
+    console.print(view.panel())
+    text = file.getvalue()
+    assert "generation 2 of 10" in text and "480 k of 2.64 M steps" in text
+    assert max(map(len, text.splitlines())) <= width
