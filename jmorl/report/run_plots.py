@@ -112,9 +112,10 @@ def _focus(axes: Axes) -> None:
     points = [line[~np.isnan(line), None] for line in lines]
     low, high = around(np.concatenate([line[core(line)] for line in points])).ravel()
     axes.set_ylim(low, high)
-    outside = sum(int((line < low).sum()) for line in points)
-    if outside:
-        note(axes, f"{plural(outside, 'point')} below")
+    every = np.concatenate(points)
+    outside = {"below": int((every < low).sum()), "above": int((every > high).sum())}
+    if any(outside.values()):
+        note(axes, ", ".join(f"{plural(count, 'point')} {where}" for where, count in outside.items() if count))
 
 
 def _choice_steps(run: StoredRun) -> list[float]:

@@ -1,5 +1,6 @@
 """How every plot looks: fonts, colours, sizes, and the way to a file. No global state, and no window."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,8 +56,12 @@ Colour = tuple[float, float, float, float]
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Draw in the project's style within this block; whatever was set before is back after it."""
-    with matplotlib.rc_context(SETTINGS):
+    """Draw in the project's style within this block; whatever was set before is back after it.
+
+    Characters that the font lacks are drawn as boxes, without a warning for each.
+    """
+    with matplotlib.rc_context(SETTINGS), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", r"Glyph .* missing from font", UserWarning)
         yield
 
 

@@ -7,12 +7,14 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from envs.core import Objective
 from jmorl.display.limits import inside
 from jmorl.report.front_plot import choices_of, close_view, front_figure, whole_view
 from jmorl.report.parallel_coordinates import parallel_figure
-from jmorl.report.plots import draw_run
+from jmorl.report.plots import PlotError, draw_run
 from jmorl.report.run_plots import prediction_figure, progress_figure
 from jmorl.report.style import RED, style
 from jmorl.search.pareto import non_dominated
@@ -188,3 +190,64 @@ def test_predictions_are_compared_with_what_came_of_them(make_run):
         error = np.mean([abs(predicted - realised) for predicted, realised in expected])
         assert f"mean error {error:.3g};" in axes.get_title(loc="left")
         assert axes.get_xlim() == axes.get_ylim()
+
+
+def test_numbers_that_are_not_finite_are_left_out_and_counted(make_run, tmp_path):
+    run = make_run()
+    metrics = {**run.metrics, "hypervolume": np.full_like(run.metrics["hypervolume"], np.inf)}
+    metrics["utility_mean"] = np.where(run.metrics["generation"] < 2, -np.inf, metrics["utility_mean"])
+    run = replace(run, metrics=metrics)
+    # The two means, and the first maximum, which is far from the others.
+    notes = [text for text in texts(progress_figure(run, "")) if "point" in text]
+    assert notes == ["3 points below", "11 points above"]
+    assert [path.name for path in draw_run(run, tmp_path)] == ALL
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e30, 1e200, 1e290])
+def test_values_of_any_size_can_be_drawn(make_run, tmp_path, scale):
+    run = make_run()
+    policies = tuple(
+        replace(each, values=scale * each.values, predicted=None if each.predicted is None else scale * each.predicted)
+        for each in run.policies
+    )
+    run = replace(run, policies=policies, front=tuple(policies[each.id] for each in run.front))
+    assert [path.name for path in draw_run(run, tmp_path)] == ALL
+
+
+@pytest.mark.parametrize(
+    "labels",
+    [
+        (("profit ($/h)", "US$"), ("cost_{x} ($)", "k$")),
+        (("speed [km/h]", "km [sum]"), ("energy [/kWh]", "[-]")),
+        (("Geschwindigkeit größer", "m/s²"), ("能耗 🚗", "千瓦")),
+    ],
+)
+def test_labels_are_drawn_as_they_are(make_run, tmp_path, labels):
+    """Without a warning about characters that the font lacks: warnings are errors here."""
+    run = make_run()
+    objectives = tuple(Objective(old.name, *new) for old, new in zip(run.objectives, labels, strict=True))
+    run = replace(run, objectives=objectives)
+    with style():
+        written = texts(front_figure(run, ""))
+    assert all(f"{label} ({unit})" in written for label, unit in labels)
+    assert [path.name for path in draw_run(run, tmp_path)] == ALL
+
+
+def test_a_plot_that_cannot_be_made_is_named_and_the_others_are_made(make_run, tmp_path, monkeypatch):
+    def full(self, path, **options):
+        if "prediction" in path.name:
+            raise OSError(28, "No space left on device")
+        return savefig(self, path, **options)
+
+    def unforeseen(run, title):
+        raise ZeroDivisionError("of a library")
+
+    savefig = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", full)
+    monkeypatch.setattr("jmorl.report.plots.front_figure", unforeseen)
+    with pytest.raises(PlotError) as error:
+        draw_run(make_run(), tmp_path)
+    front, prediction = str(error.value).split("; ")
+    assert front == f"{tmp_path / 'front.png'} cannot be drawn: ZeroDivisionError: of a library"
+    assert prediction == f"{tmp_path / 'prediction.png'} cannot be written: No space left on device"
+    assert [path.name for path in tmp_path.iterdir()] == ["progress.png"]
