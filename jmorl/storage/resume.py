@@ -16,6 +16,7 @@ from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
+from jmorl.display.commands import command
 from jmorl.events import Event
 from jmorl.learning.population import Population
 from jmorl.loop import run
@@ -172,7 +173,7 @@ def _its_user(path: Path, config: Config, environment: Environment[Any]) -> Deci
             return make_user(f"script={log}", environment.objectives)
         raise CannotContinue(
             f"the run in {path} is decided by {config.user}, but {error}; put that right, or let another user decide "
-            f"in a branch: jmorl branch {path} --generation K --out NEW --user USER"
+            f"in a branch: {command('branch', path)} --generation K --out NEW --user USER"
         ) from error
 
 
@@ -315,7 +316,10 @@ def _note_resumption(folder: RunFolder, state: RunState | None, notes: list[str]
     here = circumstances()
     changes = differences(folder.manifest, here)
     if changes:
-        notes.append(f"since the run began, {'; '.join(changes)}: what it finds may differ in the last bits")
+        notes.append(
+            f"since the run began, {'; '.join(changes)}: numbers are rounded in other ways, which learning enlarges; "
+            "from here on the run finds other policies than it would have found"
+        )
     resumption = {"at": now(), "after_generation": state.generation if state else None, **here}
     folder.manifest = {**folder.manifest, "resumed": [*folder.manifest["resumed"], resumption]}
     write_json(folder.path / "manifest.json", folder.manifest)

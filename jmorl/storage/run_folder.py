@@ -18,8 +18,11 @@ Nothing in it names a place outside it, so it may be moved.
 
 import csv
 import io
+import itertools
 import shutil
+import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -30,6 +33,7 @@ import numpy as np
 from envs.checks import check_environment
 from envs.core import Environment
 from jmorl.config import Config
+from jmorl.display.commands import command
 from jmorl.events import Decided, Event, GenerationFinished, RunFinished
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
@@ -38,6 +42,8 @@ from jmorl.storage.files import append_text, write_json, write_text, written_who
 from jmorl.storage.lock import LOCK_FILE, FolderInUse, RunLock, check_unlocked
 from jmorl.storage.manifest import Manifest, new_manifest, now
 from jmorl.storage.policy_file import save_policy
+
+RUNS = Path("runs")  # where runs are that were not given a folder
 
 Row = Mapping[str, Any]
 
@@ -62,7 +68,7 @@ class RunFolder:
     @classmethod
     def create(
         cls,
-        path: Path,
+        path: Path | None,
         config: Config,
         environment: Environment[Any],
         force: bool = False,
@@ -70,16 +76,18 @@ class RunFolder:
     ) -> "RunFolder":
         """Make the folder, with config and manifest. Raises FolderInUse as `check_free` does, or if it cannot be made.
 
+        Without a path it is a new one in `runs`, named after the time.
         `parent` is as in `new_manifest`. Raises NotAsDeclared, having changed nothing, for an environment that is not
         what it says.
         """
-        check_free(path, force)
+        if path:
+            check_free(path, force)
         check_environment(environment)
         try:
-            path.mkdir(parents=True, exist_ok=True)
+            path = _made(path)
             lock = RunLock(path)
         except OSError as error:
-            raise FolderInUse(f"{path} cannot be written: {error.strerror}") from error
+            raise FolderInUse(f"{path or RUNS} cannot be written: {error.strerror}") from error
         try:
             _empty(path)
             manifest = new_manifest(config, parent)
@@ -217,6 +225,19 @@ class CsvLog:
             self.path.unlink(missing_ok=True)
 
 
+def _made(path: Path | None) -> Path:
+    """Make the folder, or without a path the next that is free: runs that begin in the same second get one each."""
+    if path:
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+    started = time.strftime("%Y%m%d-%H%M%S")
+    for name in itertools.chain([started], (f"{started}-{number}" for number in itertools.count(2))):
+        with suppress(FileExistsError):
+            (RUNS / name).mkdir(parents=True)
+            break
+    return RUNS / name
+
+
 def check_free(path: Path, force: bool) -> None:
     """Raise FolderInUse if a run must not be written to `path`.
 
@@ -232,8 +253,8 @@ def check_free(path: Path, force: bool) -> None:
     check_unlocked(path)
     if not force and not (path / "result.json").exists():
         raise FolderInUse(
-            f"{path} holds a run that has not ended; continue it with `jmorl resume {path}`, choose another folder, or "
-            "overwrite it with --force"
+            f"{path} holds a run that has not ended; continue it with `{command('resume', path)}`, choose another "
+            "folder, or overwrite it with --force"
         )
     if not force:
         raise FolderInUse(f"{path} already holds a run; choose another folder, or overwrite it with --force")
