@@ -9,7 +9,6 @@ import json
 import os
 import secrets
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,10 +18,15 @@ from envs.core import Objective
 from jmorl.arguments import SETTING, parse
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
+from jmorl.display.characters import substitute_in
+from jmorl.display.commands import command
+from jmorl.module_path import working_directory_last
 from jmorl.signals import Interrupted, StopSignals
 
 if TYPE_CHECKING:
+    from jmorl.display.console import PlainConsole
     from jmorl.storage.resume import Continued
+    from jmorl.storage.stored_run import StoredRun
     from jmorl.studio.session import Session
 
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
@@ -30,8 +34,10 @@ EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command. Returns the exit code; argparse itself exits with 2 for unknown flags."""
+    substitute_in(sys.stdout, sys.stderr)
     options = parse(sys.argv[1:] if arguments is None else arguments)
-    sys.path.insert(0, os.getcwd())  # for an environment of one's own, as `--env my_module:my-env-v0`
+    working_directory_last()  # for an environment of one's own, as `--env my_module:my-env-v0`
+    os.environ["MPLBACKEND"] = "agg"  # matplotlib is to draw files; it fails at a notebook's backend that is not here
     from envs.checks import NotAsDeclared
     from envs.drawing import NoDrawing
     from jmorl.decision.records import ScriptError
@@ -79,7 +85,6 @@ def _train(options: argparse.Namespace) -> None:
 
 
 def _resume(options: argparse.Namespace) -> None:
-    from jmorl.report.plots import draw_run
     from jmorl.storage.resume import AlreadyFinished, resume
     from jmorl.storage.stored_run import read_run
 
@@ -90,7 +95,7 @@ def _resume(options: argparse.Namespace) -> None:
     except AlreadyFinished as finished:
         if not options.quiet:
             print(f"jmorl: {finished}", file=sys.stderr)
-        draw_run(read_run(options.run), options.run / "plots")  # it may have been killed in doing so
+        _draw(read_run(options.run))  # it may have been killed in doing so
         return
     _follow(continued, options)
 
@@ -119,18 +124,16 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
 
     What breaks the run off, but not for good, says how to go on.
     """
-    from rich.console import Console
-
+    from jmorl.display.console import PlainConsole
     from jmorl.events import RunFinished
-    from jmorl.report.plots import draw_run
     from jmorl.report.progress import watcher
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.run_folder import folder_bytes
     from jmorl.storage.stored_run import read_run
     from jmorl.units import measured_in
 
-    console = Console()
-    kind = "json" if options.json else "quiet" if options.quiet else "live" if console.is_terminal else "lines"
+    console = PlainConsole()
+    kind = _kind_of_progress(options, console)
     for note in continued.notes:
         print(f"jmorl: {note}", file=sys.stderr)
     path, config = continued.folder.path, continued.folder.config
@@ -152,15 +155,33 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
                 if not isinstance(event, RunFinished):
                     stop.check()
     except (CheckpointError, EOFError, Interrupted, OSError) as error:
-        error.add_note(f"what the run had is kept; go on with: jmorl resume {path}")
+        error.add_note(f"what the run had is kept; go on with: {command('resume', path)}")
         raise
     stored = read_run(path)
-    draw_run(stored, path / "plots")
+    _draw(stored)
     if kind in ("live", "lines"):
         megabytes, generations = folder_bytes(path) / 1e6, len(stored.metrics["generation"])
         size = f"{megabytes:.1f} MB, {megabytes / generations:.1f} for each generation"
         where = f"Everything is in {path} ({size}), the chosen policy in {path / 'chosen.npz'}."
-        console.print(where, soft_wrap=True, highlight=False)
+        console.print(where, soft_wrap=True)
+
+
+def _kind_of_progress(options: argparse.Namespace, console: "PlainConsole") -> str:
+    """How the run is shown, as `watcher` takes it. A terminal that cannot move its cursor gets lines."""
+    if options.json or options.quiet:
+        return "json" if options.json else "quiet"
+    return "live" if console.is_terminal and not console.is_dumb_terminal else "lines"
+
+
+def _draw(run: "StoredRun") -> None:
+    """Draw a run that is over. It is complete without its plots: what goes wrong with them is only said."""
+    from jmorl.report.plots import PlotError, draw_run
+
+    try:
+        draw_run(run, run.path / "plots")
+    except PlotError as error:
+        again = f"the run is complete, and {command('show', run.path)} draws it again"
+        print(f"jmorl: {error}; {again}", file=sys.stderr)
 
 
 def _studio(options: argparse.Namespace) -> None:
@@ -181,7 +202,7 @@ def _studio(options: argparse.Namespace) -> None:
             with stop.asking():
                 server.serve(session, options.host, options.port, token)
         except Interrupted as error:
-            error.add_note(f"what the run has is kept; open it again with: jmorl studio {session.view.path}")
+            error.add_note(f"what the run has is kept; open it again with: {command('studio', session.view.path)}")
             raise
         finally:
             session.close()
@@ -206,10 +227,9 @@ def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | N
     from jmorl.storage.run_folder import check_free
 
     problems = []
-    if options.out is None:
-        options.out = Path("runs") / time.strftime("%Y%m%d-%H%M%S")
     try:
-        check_free(options.out, options.force)
+        if options.out:
+            check_free(options.out, options.force)
     except FolderInUse as error:
         problems.append(f"out: {error}")
     try:
@@ -261,8 +281,8 @@ def _overrides(options: argparse.Namespace) -> dict[str, Any]:
 def _evaluate(options: argparse.Namespace) -> None:
     import jax
     import numpy as np
-    from rich.console import Console
 
+    from jmorl.display.console import PlainConsole
     from jmorl.evaluation import difference_in_errors, evaluate_in_gymnasium, evaluate_stored
     from jmorl.report.tables import comparison_table, evaluation_table
     from jmorl.storage.policy_file import load_policy, policy_path
@@ -282,7 +302,7 @@ def _evaluate(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(printed))
     else:
-        Console().print(table)
+        PlainConsole().print(table)
 
 
 def _play(options: argparse.Namespace) -> None:
@@ -307,8 +327,7 @@ def _export(options: argparse.Namespace) -> None:
 
 
 def _enautilus(options: argparse.Namespace) -> None:
-    from rich.console import Console
-
+    from jmorl.display.console import PlainConsole
     from jmorl.display.fronts import front_table
     from jmorl.storage.afterwards import choose_afterwards
     from jmorl.storage.stored_run import read_run
@@ -318,24 +337,23 @@ def _enautilus(options: argparse.Namespace) -> None:
     user = _decision_maker(options.user or stored.config.user, stored.objectives)
     chosen = choose_afterwards(stored, user, options.iterations, options.points)
     if options.json:
-        print((options.run / "enautilus.json").read_text(), end="")
+        print((options.run / "enautilus.json").read_text(encoding="utf-8"), end="")
     else:
-        Console().print(front_table(stored.front, stored.objectives, chosen_id=chosen.id))
+        PlainConsole().print(front_table(stored.front, stored.objectives, chosen_id=chosen.id))
 
 
 def _show(options: argparse.Namespace) -> None:
-    from rich.console import Console
-
+    from jmorl.display.console import PlainConsole
     from jmorl.report.plots import draw_run
     from jmorl.report.tables import run_tables
     from jmorl.storage.stored_run import read_run
 
     stored = read_run(options.run)
-    console = Console()
+    console = PlainConsole()
     for table in run_tables(stored):
         console.print(table)
     for plot in draw_run(stored, options.run / "plots"):
-        console.print(f"plot: {plot}", soft_wrap=True, highlight=False)
+        console.print(f"plot: {plot}", soft_wrap=True)
 
 
 def _paper(options: argparse.Namespace) -> None:
@@ -347,11 +365,10 @@ def _paper(options: argparse.Namespace) -> None:
 
 
 def _envs(options: argparse.Namespace) -> None:
-    from rich.console import Console
-
+    from jmorl.display.console import PlainConsole
     from jmorl.report.tables import environments_table
 
-    Console().print(environments_table())
+    PlainConsole().print(environments_table())
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import sys
 import threading
 from collections.abc import Iterator
@@ -37,9 +38,9 @@ class StopSignals:
         self._asking = False
 
     def __enter__(self) -> Self:
-        self._read_end, self._write_end = os.pipe()
-        os.set_blocking(self._write_end, False)
-        self._wakeup = signal.set_wakeup_fd(self._write_end)
+        self._read_end, self._write_end = socket.socketpair()  # a pipe would not do on every system
+        self._write_end.setblocking(False)
+        self._wakeup = signal.set_wakeup_fd(self._write_end.fileno())
         # What is ignored, as in a background job of a shell script, is to stay so.
         heard = [each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN]
         self._handlers: dict[signal.Signals, Any] = {each: signal.signal(each, self._handle) for each in heard}
@@ -53,9 +54,9 @@ class StopSignals:
         for each, handler in self._handlers.items():
             signal.signal(each, handler)
         signal.set_wakeup_fd(self._wakeup)
-        os.close(self._write_end)  # which ends the thread
+        self._write_end.close()  # which ends the thread
         self._thread.join()
-        os.close(self._read_end)
+        self._read_end.close()
 
     def check(self) -> None:
         """Raise Interrupted if a signal has come."""
@@ -79,7 +80,7 @@ class StopSignals:
 
     def _watch(self) -> None:
         came = 0
-        while numbers := os.read(self._read_end, 1):
+        while numbers := self._read_end.recv(1):
             if numbers[0] not in SIGNALS:
                 continue
             came += 1

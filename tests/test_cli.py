@@ -2,18 +2,27 @@
 
 import csv
 import json
+import os
+import re
+import shlex
 import shutil
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import envs
 from jmorl import load_policy, read_run
-from jmorl.cli import main
+from jmorl.arguments import parse
+from jmorl.cli import _kind_of_progress, main
+from jmorl.display.console import PlainConsole
 from jmorl.evaluation import evaluate_stored
 from jmorl.loop import evaluation_keys
 from tests.studio.serving import free_port
+
+ROOT = Path(__file__).parent.parent
 
 TRAIN = [
     *("train", "--env", "probe-three-ways", "--user", "weights=0.5,0.3,0.2", "--steps", "2112", "--quiet"),
@@ -362,3 +371,65 @@ def test_branch_makes_a_run_with_another_user(trained, tmp_path, capsys):
     assert main(["branch", str(trained), "--generation", "2", "--user", "Z", "--out", str(tmp_path / "no")]) == 2
     assert "user: unknown user 'Z'" in capsys.readouterr().err
     assert not (tmp_path / "no").exists()
+
+
+def test_a_run_that_is_over_does_not_fail_for_its_plots(folder, capsys):
+    folder = folder.rename(folder.with_name("with [red]space"))
+    shutil.rmtree(folder / "plots")
+    (folder / "plots").touch()  # where the folder should be
+    assert main(["resume", str(folder)]) == 0
+    errors = capsys.readouterr().err
+    for name in ("front.png", "front_pairs.png", "prediction.png", "progress.png"):
+        assert f"{folder / 'plots' / name} cannot be written: " in errors
+    assert errors.endswith(f"; the run is complete, and jmorl show '{folder}' draws it again\n")
+    assert main(["show", str(folder)]) == 1
+    printed = capsys.readouterr()
+    assert "Final front" in printed.out and "front.png cannot be written: " in printed.err
+    (folder / "plots").unlink()
+    assert main(["show", str(folder)]) == 0
+    assert f"plot: {folder / 'plots' / 'front.png'}\n" in capsys.readouterr().out
+
+
+def test_commands_in_messages_can_be_pasted_into_a_shell(folder, capsys):
+    folder = folder.rename(folder.with_name("it's here"))
+    (folder / "result.json").unlink()
+    assert main([*TRAIN, "--out", str(folder)]) == 2
+    (written,) = re.findall("`(.*)`", capsys.readouterr().err)
+    assert shlex.split(written) == ["jmorl", "resume", str(folder)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "term", "kind"),
+    [
+        ([], "xterm", "live"),
+        ([], "dumb", "lines"),
+        (["--quiet"], "xterm", "quiet"),
+        (["--json"], "dumb", "json"),
+    ],
+)
+def test_a_terminal_that_cannot_move_its_cursor_gets_lines(arguments, term, kind):
+    console = PlainConsole(force_terminal=True, _environ={"TERM": term})
+    assert _kind_of_progress(parse(["train", *arguments]), console) == kind
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {"MPLBACKEND": "module://matplotlib_inline.backend_inline"},
+        {"PYTHONIOENCODING": "ascii"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "XDG_CACHE_HOME": "", "HOME": "/proc/nowhere"},
+    ],
+    ids=lambda variables: next(iter(variables)),
+)
+def test_a_run_is_shown_on_any_machine(trained, tmp_path, variables):
+    folder = shutil.copytree(trained, tmp_path / "größer [/b]")
+    shutil.rmtree(folder / "plots")
+    config = (folder / "config.toml").read_text(encoding="utf-8")
+    (folder / "config.toml").write_text(config.replace("probe-three", "tests.registered:probe-three"), encoding="utf-8")
+    program = [sys.executable, "-m", "jmorl", "show", str(folder)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", **variables}
+    shown = subprocess.run(program, env=environment, capture_output=True, cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    assert (folder / "plots" / "front.png").exists()
+    table = shown.stdout.split(b"Final front")[1].split(b"plot: ")[0].decode()
+    assert all(f" {row['policy']} " in table for row in rows(folder / "front.csv"))

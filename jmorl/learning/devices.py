@@ -12,6 +12,20 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def cache_folder() -> Path | None:
+    """Return the folder for compiled programs, which is made; None where this user has no folder for caches.
+
+    It is below XDG_CACHE_HOME; that is ignored, as its standard says, if it is not an absolute path.
+    """
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    try:
+        folder = (given if given.is_absolute() else Path.home() / ".cache") / "jmorl" / "jax"
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # it cannot be made; there is no home folder
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
 def use_all_cpu_cores() -> None:
     """Make every CPU core this process may use a JAX device, and keep compiled programs on disk.
 
@@ -21,8 +35,8 @@ def use_all_cpu_cores() -> None:
     if "JAX_NUM_CPU_DEVICES" not in os.environ:
         with suppress(RuntimeError):  # JAX has been used
             jax.config.update("jax_num_cpu_devices", usable_cores())
-    if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
-        cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "jmorl" / "jax"
+    cache = cache_folder()
+    if "JAX_COMPILATION_CACHE_DIR" not in os.environ and cache:
         jax.config.update("jax_compilation_cache_dir", str(cache))
     if "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS" not in os.environ:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)

@@ -3,8 +3,11 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
-from jmorl.learning.devices import usable_cores
+import pytest
+
+from jmorl.learning.devices import cache_folder, usable_cores
 
 
 def printed_by(program):
@@ -34,3 +37,40 @@ def test_where_the_system_does_not_say_all_cores_of_the_machine_are_used(monkeyp
     assert usable_cores() == 12
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert usable_cores() == 1
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    return tmp_path
+
+
+def test_compiled_programs_are_kept_in_the_users_folder_for_caches(home, monkeypatch):
+    assert cache_folder() == home / ".cache" / "jmorl" / "jax" and cache_folder().is_dir()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "other"))
+    assert cache_folder() == home / "other" / "jmorl" / "jax"
+
+
+@pytest.mark.parametrize("ignored", ["", "relative/folder"])
+def test_a_cache_folder_that_is_no_absolute_path_is_ignored(home, monkeypatch, ignored):
+    monkeypatch.setenv("XDG_CACHE_HOME", ignored)
+    assert cache_folder() == home / ".cache" / "jmorl" / "jax"
+
+
+def test_without_a_place_for_it_there_is_no_cache(home, monkeypatch):
+    (home / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "file"))
+    assert cache_folder() is None
+
+    def no_home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", no_home)
+    assert cache_folder() is None
+
+
+def test_a_cache_folder_that_may_not_be_written_is_not_used(home, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    assert cache_folder() is None
