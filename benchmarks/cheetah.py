@@ -59,10 +59,10 @@ def _record(config: Config) -> RunRecord:
     else:
         paper = plan.interactive(item, "raw", config.user, config.seed)
     same = {"steps": paper.config.steps, "checkpoints": paper.config.checkpoints.model_dump()}
-    if config.replace(**same).digest() == paper.config.digest():
+    if config.replace(**same).identity() == paper.config.identity():
         cell, places = paper, PAPER
     else:
-        cell, places = Cell(config.digest(), config), VARIANTS
+        cell, places = Cell(config.identity(), config), VARIANTS
     return make([cell], places, lambda *_: None)[0] if missing([cell], places) else read_record(places.record(cell))
 
 

@@ -30,6 +30,7 @@ __all__ = [
 ]
 
 _registry: dict[str, Callable[..., Environment[Any]]] = {}
+_made: dict[str, Environment[Any]] = {}  # by id as written: they hold no state, and compiled programs are kept for each
 
 
 def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
@@ -42,12 +43,20 @@ def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
 
 
 def make(id: str, **options: Any) -> Environment[Any]:
-    """The environment called `id`; `module:id` imports `module`, which registers it, first.
+    """Return the environment called `id`, always the same; `module:id` imports `module`, which registers it, first.
 
     `id,option=value` is another way to give options, as texts. Raises ValueError, naming what is known, for a module,
     an id or an option that there is none of, for a value that the environment refuses, for a module or an environment
     that breaks down, and NotAsDeclared for one that declares what cannot be.
     """
+    if options:
+        return _new(id, options)
+    if id not in _made:
+        _made[id] = _new(id, {})
+    return _made[id]
+
+
+def _new(id: str, options: dict[str, Any]) -> Environment[Any]:
     module, name, written = _parts(id)
     if module:
         _import(id, module)

@@ -162,7 +162,7 @@ def broken_record(path: Path, config: Config, fault: str) -> RunRecord:
         manifest = read_manifest(path)
         names = tuple(objective.name for objective in envs.make(config.env).objectives)
         return RunRecord(
-            digest=config.digest(),
+            digest=config.identity(),
             config=config.model_dump(mode="json"),
             objectives=names,
             commit=manifest["commit"],
@@ -211,7 +211,7 @@ def _record(run: StoredRun, reason: str, chosen: int | None, fault: str | None =
         if isinstance(record, DecisionRecord)
     )
     return RunRecord(
-        digest=run.config.digest(),
+        digest=run.config.identity(),
         config=run.config.model_dump(mode="json"),
         objectives=tuple(names),
         commit=run.manifest["commit"],
@@ -271,7 +271,7 @@ def read_record(path: Path) -> RunRecord:
 
 def is_record_of(path: Path, config: Config) -> bool:
     """Whether the file is there, and of a run with exactly these settings. Raises RecordError if it is unreadable."""
-    return path.exists() and read_record(path).digest == config.digest()
+    return path.exists() and config.is_identified_by(read_record(path).digest)
 
 
 def _device(manifest: Mapping[str, Any]) -> str:

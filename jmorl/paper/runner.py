@@ -6,6 +6,7 @@ work/KEY/         its run folder, from which it is resumed
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -14,8 +15,8 @@ import envs
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.events import Event
-from jmorl.learning.population import Population, TrainingFault
-from jmorl.learning.stack import Seat, Stack
+from jmorl.learning.population import TrainingFault
+from jmorl.learning.stack import Stack, StackedPopulation
 from jmorl.paper.plan import Cell
 from jmorl.paper.record import RunRecord, broken_record, is_record_of, read_record, record_of, write_record
 from jmorl.storage.resume import AlreadyFinished, Continued, resume
@@ -57,20 +58,20 @@ def make(
     to the one that a run's config names. What `watch` raises breaks a run off; it goes on from its last checkpoint the
     next time. A run that breaks down by itself would do so again: it is kept as it was until then, with its `fault`.
     """
-    stack = _stack(cells[0].config)
     keys = tuple(cell.key for cell in cells) if len(cells) > 1 else ()
 
-    def make_one(cell: Cell, seat: Seat) -> RunRecord:
-        with seat:
-            record = replace(_made(cell, places, watch, user, seat), together=keys)
+    def make_one(cell: Cell, population: StackedPopulation | None) -> RunRecord:
+        with population or nullcontext():
+            record = replace(_made(cell, places, watch, user, population), together=keys)
         write_record(places.record(cell), record)
         return record
 
-    seats = stack.seats(len(cells))
     if len(cells) == 1:  # an interruption is to reach it at once, and somebody's own user need not know of threads
-        return [make_one(cells[0], seats[0])]
+        return [make_one(cells[0], None)]
+    config = cells[0].config
+    stack = Stack(envs.make(config.env), config.learning, len(cells))
     with ThreadPoolExecutor(len(cells)) as pool:
-        return list(pool.map(make_one, cells, seats))
+        return list(pool.map(make_one, cells, stack.populations))
 
 
 def groups(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
@@ -82,16 +83,21 @@ def groups(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
 
 def shape(config: Config) -> Hashable:
     """Equal for runs that can share a program."""
-    return config.env, config.population.agents, config.ppo, config.evaluation
+    return config.env, config.learning
 
 
-def _made(cell: Cell, places: Places, watch: Watch, user: Callable[[], DecisionMaker] | None, seat: Seat) -> RunRecord:
+def _made(
+    cell: Cell,
+    places: Places,
+    watch: Watch,
+    user: Callable[[], DecisionMaker] | None,
+    population: StackedPopulation | None,
+) -> RunRecord:
     folder = places.work / cell.key
     try:
         continued = _begun(cell, folder)
     except AlreadyFinished:
         return record_of(read_run(folder))
-    population = Population(continued.folder.environment, cell.config, seat)
     try:
         with continued.folder:
             for event in continued.events(user() if user else None, population=population):
@@ -101,19 +107,10 @@ def _made(cell: Cell, places: Places, watch: Watch, user: Callable[[], DecisionM
     return record_of(read_run(folder))
 
 
-_stacks: dict[Hashable, Stack] = {}  # a few: compiled once, and used by all runs of one shape
-
-
-def _stack(config: Config) -> Stack:
-    if shape(config) not in _stacks:
-        _stacks[shape(config)] = Stack(envs.make(config.env), config)
-    return _stacks[shape(config)]
-
-
 def _begun(cell: Cell, folder: Path) -> Continued:
     """The run as far as it is; from the beginning if what is there was made with other settings."""
     try:
-        begun = resolve(file=folder / "config.toml").digest() == cell.config.digest()
+        begun = resolve(file=folder / "config.toml").identity() == cell.config.identity()
     except ConfigError:
         begun = False
     if begun:

@@ -7,6 +7,8 @@ import numpy as np
 
 from jmorl.search.bounds import within
 
+REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor the middle dominate a gain
+
 
 @dataclass(frozen=True)
 class Scale:

@@ -8,8 +8,8 @@ from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion
 from jmorl.display.limits import around, core, inside
 from jmorl.display.text import plural
+from jmorl.methods.base import Prospect
 from jmorl.search.bounds import within
-from jmorl.state import Prospect
 from jmorl.studio.chart_style import (
     BLUE,
     GREEN,

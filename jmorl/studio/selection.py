@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from jmorl.state import Prospect
+from jmorl.methods.base import Prospect
 
 LETTERS = "ABC"  # of the places
 

@@ -14,11 +14,13 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import envs
 from jmorl.decision.protocol import Answer, PointAnswer, Question
 from jmorl.events import RunFinished
+from jmorl.loop import make_method
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
-from jmorl.state import RunState, prospect
+from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
@@ -199,15 +201,17 @@ class Session:
     def _think(self, question: Question | None, policy: int) -> None:
         """Find out in the background what choosing the policy would mean."""
         state = self.view.state
-        if question and question.purpose == "steer" and state and policy not in self.selection.prospects:
+        if question and question.purpose != "final" and state and policy not in self.selection.prospects:
             self._thinking.submit(self._note_prospect, question, state, policy)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
         try:
-            found = prospect(self.view.config, state, question.policy(policy))
+            chosen = question.policy(policy)
         except ValueError:  # a policy that is looked at, but not to choose from
             return
-        if self.view.question is question:
+        config = self.view.config
+        found = make_method(config, envs.make(config.env)).prospect(state, chosen)
+        if found and self.view.question is question:
             self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: found}))
 
     def _rearrange(self, change: Callable[[Selection], Selection]) -> None:

@@ -5,9 +5,9 @@ import re
 import numpy as np
 
 from jmorl.display.text import duration, number_format, plural, short_count, values_in_words
+from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
-from jmorl.state import Prospect
 from jmorl.studio.selection import Selection
 from jmorl.studio.view import PERSON, View
 
@@ -88,7 +88,7 @@ def heading(view: View, selection: Selection) -> str:
         return "What there is to see comes with the end of the warm-up."
     if view.config.user != PERSON:
         return f"User {view.config.user} decides; you watch."
-    if view.config.method != "interactive":
+    if view.timeline.silent is None:
         return "You are asked once, at the end."
     if view.timeline.silent > 1:
         return f"You are asked again in {view.timeline.silent} generations."

@@ -12,6 +12,7 @@ import envs
 from envs.core import Objective
 from jmorl.config import Config, resolve
 from jmorl.decision.protocol import Question
+from jmorl.decision.records import DecisionRecord
 from jmorl.display.text import REASONS
 from jmorl.events import Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
@@ -80,7 +81,7 @@ def stored_view(path: Path) -> View:
     if not (path / "metrics.csv").exists():
         return nothing
     stored = read_run(path)
-    decisions = [record for record in stored.decisions if record.purpose != "enautilus"]
+    decisions = [record for record in stored.decisions if isinstance(record, DecisionRecord)]
     return replace(
         nothing,
         generations=_generations(stored),
@@ -98,18 +99,18 @@ def after(view: View, event: Event, now: float) -> View:
     assert view.timeline is not None
     view = replace(view, timeline=view.timeline.after(event, now))
     match event:
-        case Resumed(state):
+        case Resumed(state=state):
             past = tuple(choice for choice in view.choices if choice[0] <= state.generation)
-            view = replace(view, state=state, front=state.archive.members, bounds=state.bounds)
+            view = replace(view, state=state, front=state.archive.members, bounds=event.bounds)
             return replace(view, previous=state.choice, choices=past)
         case GenerationFinished(state):
             front = state.archive.members
             values, metrics = values_of(front), event.front
-            over = Generation(state.generation, values, event.steps, metrics.hypervolume, event.utility.utility_max)
+            over = Generation(state.generation, values, event.steps, metrics.hypervolume, event.utility_max)
             return replace(view, state=state, generations=(*view.generations, over), front=front)
-        case Decided():
-            choices = (*view.choices, (event.question.generation, event.chosen.values))
-            return replace(view, question=None, bounds=event.bounds, previous=event.chosen, choices=choices)
+        case Decided(chosen=Policy() as chosen):
+            choices = (*view.choices, (event.question.generation, chosen.values))
+            return replace(view, question=None, bounds=event.bounds, previous=chosen, choices=choices)
         case RunFinished():
             return replace(view, result=event.chosen, reason=REASONS[event.reason], timeline=None)
     return view
