@@ -6,7 +6,7 @@ module that does so. An id may carry options of its environment: `envs.make("mo-
 
 import importlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any
 
 from envs.checks import NotAsDeclared, check_declaration, check_environment
@@ -30,7 +30,9 @@ __all__ = [
 ]
 
 _registry: dict[str, Callable[..., Environment[Any]]] = {}
-_made: dict[str, Environment[Any]] = {}  # by id as written: they hold no state, and compiled programs are kept for each
+_made: dict[
+    Hashable, Environment[Any]
+] = {}  # by factory and options: they hold no state, and programs are kept for each
 
 
 def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
@@ -45,18 +47,10 @@ def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
 def make(id: str, **options: Any) -> Environment[Any]:
     """Return the environment called `id`, always the same; `module:id` imports `module`, which registers it, first.
 
-    `id,option=value` is another way to give options, as texts. Raises ValueError, naming what is known, for a module,
-    an id or an option that there is none of, for a value that the environment refuses, for a module or an environment
-    that breaks down, and NotAsDeclared for one that declares what cannot be.
+    `id,option=value` is another way to give options, as texts; options must be hashable. Raises ValueError, naming
+    what is known, for a module, an id or an option that there is none of, for a value that the environment refuses,
+    for a module or an environment that breaks down, and NotAsDeclared for one that declares what cannot be.
     """
-    if options:
-        return _new(id, options)
-    if id not in _made:
-        _made[id] = _new(id, {})
-    return _made[id]
-
-
-def _new(id: str, options: dict[str, Any]) -> Environment[Any]:
     module, name, written = _parts(id)
     if module:
         _import(id, module)
@@ -64,6 +58,13 @@ def _new(id: str, options: dict[str, Any]) -> Environment[Any]:
         raise ValueError(f"unknown environment {name!r}; known: {', '.join(ids())}")
     factory, options = _registry[name], written | options
     _check_options(name, factory, options)
+    key = (factory, *sorted(options.items()))
+    if key not in _made:
+        _made[key] = _new(name, factory, options)
+    return _made[key]
+
+
+def _new(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> Environment[Any]:
     try:
         environment = factory(**options)
     except ValueError:

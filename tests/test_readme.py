@@ -27,7 +27,7 @@ def blocks(heading):
 
 
 @pytest.fixture
-def small(compiled_once, tmp_path, monkeypatch):
+def small(tmp_path, monkeypatch):
     """An empty folder to be in, where `jmorl.resolve` gives small sizes; those settings."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("jmorl.use_all_cpu_cores", lambda: None)  # the suite has done so

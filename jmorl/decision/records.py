@@ -100,8 +100,9 @@ Record = DecisionRecord | PointRecord | AnswerRecord
 
 def _kind(record: Any) -> str:
     """Return which kind of record the fields are of."""
-    purpose = str(record.get("purpose") if isinstance(record, dict) else record.purpose)
-    return {"steer": "decision", "final": "decision", "enautilus": "point"}.get(purpose, "answer")
+    fields = record if isinstance(record, dict) else vars(record)
+    known = {"steer": "decision", "final": "decision", "enautilus": "point"}
+    return known.get(str(fields.get("purpose")), "answer" if fields.get("format") == FORMAT else "")
 
 
 _RECORD: TypeAdapter[Record] = TypeAdapter(

@@ -98,7 +98,7 @@ def test_who_is_asked_at_the_end_waits_for_the_whole_run():
 
 
 @pytest.fixture(scope="module")
-def pgmorl(compiled_once, small_config, tmp_path_factory):
+def pgmorl(small_config, tmp_path_factory):
     """A function of a config, that makes a PGMORL run of three objectives with it."""
     folder = tmp_path_factory.mktemp("runs")
 

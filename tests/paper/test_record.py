@@ -33,7 +33,7 @@ VARIANTS = {
 
 
 @pytest.fixture(scope="module", params=VARIANTS)
-def run(request, compiled_once, small_config, tmp_path_factory):
+def run(request, small_config, tmp_path_factory):
     """A run's folder, its config and its generations."""
     config = small_config.replace(**VARIANTS[request.param])
     path = tmp_path_factory.mktemp("runs") / request.param

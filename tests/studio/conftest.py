@@ -56,7 +56,7 @@ def make_session():
 
 
 @pytest.fixture
-def session(compiled_once, person_config, make_session, tmp_path):
+def session(person_config, make_session, tmp_path):
     """A new run with a person as its user, in its warm-up."""
     session = make_session()
     folder = RunFolder.create(tmp_path / "run", person_config, envs.make(person_config.env))

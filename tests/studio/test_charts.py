@@ -10,9 +10,9 @@ import pytest
 from envs.core import Objective
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
+from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
-from jmorl.state import Prospect
 from jmorl.studio import dialogue, texts
 from jmorl.studio.curves import curve_options
 from jmorl.studio.front_chart import front_marks, front_options

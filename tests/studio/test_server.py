@@ -24,7 +24,7 @@ NAME = "<img src=x onerror=alert(1)>"
 
 
 @pytest.fixture(scope="module")
-def runs(compiled_once, small_config, tmp_path_factory):
+def runs(small_config, tmp_path_factory):
     """A finished run in a folder whose name is markup, with a secret beside it."""
     place = tmp_path_factory.mktemp("studio")
     train(place / NAME, small_config.replace(env=f"tests.registered:{ThreeWays.id}"))

@@ -3,14 +3,18 @@
 import numpy as np
 import pytest
 
+import envs
 from jmorl.events import Decided, GenerationFinished
-from jmorl.loop import run
+from jmorl.loop import make_method, run
 from jmorl.search.bounds import within
-from jmorl.state import prospect
+
+
+def prospect(config, state, policy):
+    return make_method(config, envs.make(config.env)).prospect(state, policy)
 
 
 @pytest.fixture(scope="module")
-def events(compiled_once, small_config):
+def events(small_config):
     return list(run(small_config))
 
 
