@@ -2,10 +2,13 @@
 
 from collections.abc import Sequence
 
+from jmorl.experiments.statistics import Difference
+from jmorl.experiments.tables import million, share
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.data import PublishedTable
-from jmorl.paper.naming import million, named, sentence, share
-from jmorl.paper.results import Pair, TargetRow, pair_of
-from jmorl.paper.statistics import Difference
+from jmorl.paper.drift import at_the_start, by_untrained, drifted, prevented
+from jmorl.paper.plan import named
+from jmorl.paper.results import Pair, pair_of
 from jmorl.paper.verdicts import METHODS, against_published, order, published_order, shown, steps_saved
 
 FASTER = ("B", "C")  # targets for which fewer steps are asked for, too
@@ -38,8 +41,10 @@ def raw_bar(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
         + ("" if target in FASTER else ", which is not asked for here")
     )
     if not misses:
-        return f"Target {target}: met{_how_surely(target, pair.difference)}. {sentence(counts)}; {steps}."
-    return f"Target {target}: not met: {' and '.join(misses)}. {sentence(counts)}; {steps}. {sentence(shown([ours]))}."
+        return f"Target {target}: met{_how_surely(target, pair.difference)}. {_sentence(counts)}; {steps}."
+    return (
+        f"Target {target}: not met: {' and '.join(misses)}. {_sentence(counts)}; {steps}. {_sentence(shown([ours]))}."
+    )
 
 
 def _misses(pair: Pair, best: float) -> list[str]:
@@ -85,35 +90,41 @@ def _explanation(published: PublishedTable, row: TargetRow) -> str:
 
 
 def _cause_of_more(row: TargetRow) -> str:
-    if row.at_the_start:
+    if at_the_start(row):
         return (
-            f"An uncopied defect: {row.at_the_start} of the successes come with generation 0 ({row.untrained} by "
+            f"An uncopied defect: {at_the_start(row)} of the successes come with generation 0 ({by_untrained(row)} by "
             "untrained policies), where their program does not check."
         )
-    if row.drifted:
+    if drifted(row):
         return (
-            f"Drift: {row.drifted} of the {row.times.successes} successes are of no trained policy that would do in "
+            f"Drift: {drifted(row)} of the {row.times.successes} successes are of no trained policy that would do in "
             "the units after the warm-up."
         )
     return f"An uncopied defect, {UNCOPIED}; none of the successes is owed to moving units."
 
 
 def _cause_of_less(row: TargetRow) -> str:
-    if row.prevented:
+    if prevented(row):
         return (
-            f"Drift: {row.prevented} of the runs that never arrive have a trained policy that would do in the units "
+            f"Drift: {prevented(row)} of the runs that never arrive have a trained policy that would do in the units "
             "after the warm-up."
         )
-    return f"Our own shortfall: moving units hide no success. {sentence(shown([row]))}."
+    return f"Our own shortfall: moving units hide no success. {_sentence(shown([row]))}."
 
 
 def drift_told(row: TargetRow) -> str:
     """Whether successes in paper units are of policies or of units."""
     of = "1 success" if row.times.successes == 1 else f"{row.times.successes} successes"
-    if not row.drifted:
+    owed = drifted(row)
+    if not owed:
         return f"Target {row.target}: none of {named(row.method)}'s {of} is owed to moving units."
-    start = f", {row.untrained} of them of policies never trained" if row.untrained else ""
+    start = f", {by_untrained(row)} of them of policies never trained" if by_untrained(row) else ""
     return (
-        f"Target {row.target}: {row.drifted} of {named(row.method)}'s {of} are owed to moving units{start}: no trained "
+        f"Target {row.target}: {owed} of {named(row.method)}'s {of} are owed to moving units{start}: no trained "
         "policy found by then would do in the units after the warm-up."
     )
+
+
+def _sentence(text: str) -> str:
+    """Begin a text with a capital letter."""
+    return text[0].upper() + text[1:]

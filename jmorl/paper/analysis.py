@@ -12,48 +12,14 @@ from envs import make
 from jmorl.config import Config
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.utility import UtilityUser, linear_utility
-from jmorl.paper.drift import reached_without_drift, untrained
-from jmorl.paper.record import RunRecord
+from jmorl.experiments.record import RunRecord
+from jmorl.paper.drift import untrained
 from jmorl.search.bounds import within
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Policy, values_of
 from jmorl.units import measured_in
 
 ENAUTILUS_ITERATIONS, ENAUTILUS_POINTS = 3, 3  # the paper's
-
-
-@dataclass(frozen=True)
-class Reached:
-    """When and how a run reached a target first."""
-
-    generation: int
-    steps: int
-    seconds: float  # compilation not counted
-    policy: int  # id: of those that reached it, the one that clears it by most in its tightest objective
-    untrained: bool  # whether none of those that reached it had been trained
-    without_drift: bool  # whether any trained policy found by then had reached it in the units after the warm-up
-
-
-def reached(record: RunRecord, target: Sequence[float], cap: float = np.inf) -> Reached | None:
-    """The first generation whose archive has a policy at least as good as the target in every objective.
-
-    None if there is none that ends within `cap` steps.
-    """
-    for number, generation in enumerate(record.generations):
-        ids = np.array(generation.front)
-        values = record.values[ids]
-        inside = within(values, np.array(target))
-        if generation.steps <= cap and inside.any():
-            margins = np.where(inside, (values - target).min(axis=1), -np.inf)
-            return Reached(
-                number,
-                generation.steps,
-                float(record.seconds[number]),
-                int(ids[np.argmax(margins)]),
-                bool(untrained(record)[ids[inside]].all()),
-                reached_without_drift(record, target, number),
-            )
-    return None
 
 
 def generations_within(record: RunRecord, steps: int) -> int:

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from jmorl.experiments.statistics import Difference
+from jmorl.experiments.tables import million
 from jmorl.paper.analysis import Finals, non_dominated_or_equal
 from jmorl.paper.data import Claims
-from jmorl.paper.naming import million, named
+from jmorl.paper.plan import named
 from jmorl.paper.results import Curves, curve_pairs
-from jmorl.paper.statistics import Difference
 from jmorl.paper.verdicts import MISSING, ahead
 
 SETTLED = 0.05  # of a curve's range from its end: where it has settled

@@ -18,9 +18,10 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from envs import make
 from jmorl.display.limits import core
 from jmorl.display.text import objective_label
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.analysis import Finals
 from jmorl.paper.plan import NAMES, SHORTER, Item, Plan
-from jmorl.paper.results import Curves, Records, TargetRow, curves, final_policies, target_rows
+from jmorl.paper.results import Curves, Records, curves, final_policies, target_rows
 from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, legend_below, new_figure, style
 from jmorl.storage.files import written_whole
 from jmorl.units import measured_in

@@ -1,32 +1,18 @@
 """Parts of the report, as Markdown."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from jmorl.display.text import duration
+from jmorl.experiments.diagnostics import waiting
+from jmorl.experiments.record import RunRecord
+from jmorl.experiments.tables import between, million, number, share, table, vector
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.analysis import ENAUTILUS_ITERATIONS, Finals, seconds_within
 from jmorl.paper.data import PublishedRow, PublishedTable
-from jmorl.paper.drift import common_generation, sigma_at
-from jmorl.paper.mechanism import mechanism, waiting
-from jmorl.paper.naming import million, number, share
-from jmorl.paper.record import RunRecord
-from jmorl.paper.results import Curves, TargetRow
-from jmorl.paper.statistics import Difference, Interval
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def vector(values: Sequence[float] | np.ndarray) -> str:
-    return f"({', '.join(f'{value:.4g}' for value in values)})"
-
-
-def between(found: Interval | Difference) -> str:
-    """A mean of steps and its interval, in millions."""
-    return f"{found.mean / 1e6:.2f} [{found.low / 1e6:.2f}, {found.high / 1e6:.2f}]"
+from jmorl.paper.drift import at_the_start, common_generation, drifted, sigma_at
+from jmorl.paper.results import Curves
 
 
 def published_steps(row: PublishedRow, cap: int) -> str:
@@ -62,23 +48,6 @@ def _ours(row: TargetRow | None, wanted: bool) -> list[str]:
     if row is None:
         return ["missing" if wanted else "", ""]
     return [between(row.times.restricted_mean), share(row.times.successes, len(row.seeds))]
-
-
-def seed_by_seed(rows: Sequence[TargetRow]) -> str:
-    """Million steps of every run; what never arrived is marked by ≥, what broke down is said to have."""
-    seeds = list(dict.fromkeys(seed for row in rows for seed in row.seeds))
-    lines = []
-    for row in rows:
-        runs = {seed: _steps(row, index) for index, seed in enumerate(row.seeds)}
-        lines.append([row.target, vector(row.values), row.method, *(runs.get(seed, "missing") for seed in seeds)])
-    return table(["target", "values", "method", *(f"seed {seed}" for seed in seeds)], lines)
-
-
-def _steps(row: TargetRow, index: int) -> str:
-    steps, record = row.times.reached[index], row.records[index]
-    if steps is not None:
-        return f"{steps / 1e6:.2f}"
-    return f"≥ {row.times.budget / 1e6:.2f}" + (f" (broke down at {million(record.total_steps)})" * bool(record.fault))
 
 
 def costs(rows: Sequence[TargetRow], published: PublishedTable) -> str:
@@ -142,8 +111,9 @@ def honesty(rows: Sequence[TargetRow]) -> str:
     for row in rows:
         runs = [_sigmas(row, rows, seed) for seed in row.seeds]
         first, last = (np.mean([run[when] for run in runs if run], axis=0) for when in (0, 1))
-        raw = vector(row.raw.mean(axis=0)) if len(row.raw) else "never reached"
-        counts = [share(count, row.times.successes) for count in (row.at_the_start, row.drifted)]
+        returns = [record.raw[hit.policy] for record, hit in row.hits]
+        raw = vector(np.mean(returns, axis=0)) if returns else "never reached"
+        counts = [share(count, row.times.successes) for count in (at_the_start(row), drifted(row))]
         sigmas = [vector(first), vector(last)] if any(runs) else ["", ""]
         lines.append([row.target, row.method, raw, *sigmas, *(counts if row.times.successes else ["", ""])])
     return table(head, lines)
@@ -157,19 +127,6 @@ def _sigmas(row: TargetRow, rows: Sequence[TargetRow], seed: int) -> tuple[np.nd
     ]
     last = common_generation(peers)
     return (sigma_at(record, 0), sigma_at(record, last)) if last >= 0 else None
-
-
-def mechanisms(rows: Sequence[TargetRow]) -> str:
-    """How the searches got on."""
-    head = ["target", "method", "candidates (median)", "generations with only the choice", "answers that repeat"]
-    head += ["predicted gain", "realised gain"]
-    lines = []
-    for row in rows:
-        found = mechanism(row.records)
-        shares = [number(found.candidates, ".0f"), number(found.alone, ".0%"), number(found.repeated, ".0%")]
-        gains = [number(gain, "+.1%") for gain in (found.predicted_gain, found.realised_gain)]
-        lines.append([row.target, row.method, *shares, *gains])
-    return table(head, lines)
 
 
 def ends(rows: Sequence[Curves]) -> str:

@@ -1,21 +1,23 @@
 """Which runs the paper's tables and figures are made of, and with which settings.
 
-A cell is one training run. What two items need alike is one cell: PGMORL asks nobody before its end, so its run for a
-seed serves every user and target.
+What two items need alike is one cell: PGMORL asks nobody before its end, so its run for a seed serves every user and
+target.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from jmorl.config import Config, resolve
+from jmorl.config import resolve
 from jmorl.decision.utility import USERS
+from jmorl.experiments.cells import Cell
 from jmorl.paper.data import Targets, honest, published
 
 CAR, CHEETAH = "mo-mountaincarcontinuous-v0", "mo-halfcheetah-v5"
 NAMES = {CAR: "mountaincar", CHEETAH: "halfcheetah"}
 METHODS = ("interactive", "pgmorl")
 SHORTER = "pgmorl-40"  # PGMORL on HalfCheetah with the paper's warm-up, which it has no reason to wait longer for
+METHOD_NAMES = {"interactive": "the interactive method", "pgmorl": "PGMORL", SHORTER: "PGMORL with warm-up 40"}
 TARGET_SEEDS = (1, 7, 10, 42, 100)
 USER_SEEDS = (1, 42, 100)
 PILOT_SEEDS = (2, 3, 5)  # other than all of the above: targets are chosen on them
@@ -70,15 +72,6 @@ ITEMS = {
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One training run. Its key names its file, and no two cells of a plan have the same."""
-
-    key: str
-    config: Config
-    later: bool = False  # made after all others
-
-
-@dataclass(frozen=True)
 class Plan:
     """How the experiment is made: at full size, or `quick`; with which seeds, if not the paper's."""
 
@@ -116,6 +109,12 @@ class Plan:
         cells = [self.interactive(item, units, goal, seed) for goal in goals for seed in seeds]
         baselines = self.methods(item, units)[1:]
         return cells + [self.pgmorl(item, units, seed, method) for method in baselines for seed in seeds]
+
+    def later(self, item: Item, units: str) -> list[Cell]:
+        """Return those of an item's runs that are made after the other runs of all items."""
+        if SHORTER not in self.methods(item, units):
+            return []
+        return [self.pgmorl(item, units, seed, SHORTER) for seed in self.seeds_of(item)]
 
     def cell(self, item: Item, units: str, method: str, goal: str, seed: int) -> Cell:
         """The run of a method for a user or target."""
@@ -180,12 +179,12 @@ class Plan:
         if method == SHORTER:
             config = config.replace(population={"warmup_iterations": SHORTER_WARM_UP[self.quick]})
         key = f"{NAMES[env]}-{units}-{method}-{goal}-seed-{seed}"
-        return Cell(key, config.replace(steps=self._steps(env, to_cap)), method == SHORTER)
+        return Cell(key, config.replace(steps=self._steps(env, to_cap)))
 
 
-def distinct(cells: Iterable[Cell]) -> list[Cell]:
-    """Each cell once, in order."""
-    return list({cell.key: cell for cell in cells}.values())
+def named(method: str) -> str:
+    """Return the name of a method in a sentence."""
+    return METHOD_NAMES[method]
 
 
 def in_order(items: Sequence[Item], units: Sequence[str]) -> Iterator[tuple[Item, str]]:

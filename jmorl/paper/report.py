@@ -4,13 +4,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from jmorl.experiments import tables
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper import claims, markdown
 from jmorl.paper.acceptance import drift_told, explanations, raw_bar
 from jmorl.paper.data import PublishedTable, honest, published
 from jmorl.paper.figures import draw
 from jmorl.paper.introduction import DEVIATIONS, DIFFERENT_UNITS, INTRODUCTION, MEAN_UTILITY, POOLED, SWAPPED
 from jmorl.paper.plan import ITEMS, NAMES, Item, Plan
-from jmorl.paper.results import Records, TargetRow, curves, final_policies, target_rows
+from jmorl.paper.results import Records, curves, final_policies, target_rows
 from jmorl.paper.state import state
 from jmorl.paper.verdicts import MISSING, table_verdict, target_verdict
 from jmorl.storage.files import write_text
@@ -112,9 +114,9 @@ def _table_section(table: PublishedTable, item: Item, rows: Mapping[str, Sequenc
         else:
             parts.append(_listed(drift_told(row) for row in each if row.times.successes))
             parts.append(_explained(table, by_target))
-        parts += [markdown.seed_by_seed(each), markdown.costs(each, table)]
+        parts += [tables.seed_by_seed(each), markdown.costs(each, table)]
         parts.append(markdown.honesty(each) if units == "paper" else "")
-        parts += ["What the searches were doing:", markdown.mechanisms(each)]
+        parts += ["What the searches were doing:", tables.mechanisms(each)]
     return parts if rows else [*parts, MISSING]
 
 

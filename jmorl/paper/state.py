@@ -3,10 +3,12 @@
 from collections.abc import Iterator, Sequence
 
 from jmorl.display.text import duration, short_count
+from jmorl.experiments import tables
+from jmorl.experiments.cells import Cell, distinct
+from jmorl.experiments.record import RunRecord
 from jmorl.paper import markdown
 from jmorl.paper.data import published
-from jmorl.paper.plan import ITEMS, NAMES, Cell, Item, Plan, distinct, in_order
-from jmorl.paper.record import RunRecord
+from jmorl.paper.plan import ITEMS, NAMES, Item, Plan, in_order
 from jmorl.paper.results import Records
 
 Wanted = Sequence[tuple[Item, str, Sequence[Cell]]]
@@ -22,7 +24,7 @@ def state(plan: Plan, items: Sequence[Item], units: Sequence[str], records: Reco
     parts = [
         f"It rests on {total}" + (f" on {devices}." if devices else "."),
         _commits(there),
-        markdown.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)),
+        tables.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)),
         _beside_the_papers(wanted, records),
         _waits(there),
         "\n".join([*_missing(wanted, records), *_broken(wanted, records)]),
@@ -93,7 +95,7 @@ def _beside_the_papers(wanted: Wanted, records: Records) -> str:
         "All runs of an environment, those of its table, and the paper's time for that table: the time per run of each "
         "row times its five runs. One run of PGMORL serves all targets here."
     )
-    return f"{text}\n\n{markdown.table(['environment', 'units', 'all runs', 'table', 'table in the paper'], lines)}"
+    return f"{text}\n\n{tables.table(['environment', 'units', 'all runs', 'table', 'table in the paper'], lines)}"
 
 
 def _missing(wanted: Wanted, records: Records) -> Iterator[str]:

@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 from jmorl.config import Config
+from jmorl.experiments.diagnostics import Mechanism, mechanism
+from jmorl.experiments.statistics import Difference
+from jmorl.experiments.tables import million, number, share
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.data import PublishedTable
-from jmorl.paper.mechanism import Mechanism, mechanism
-from jmorl.paper.naming import million, named, number, share
-from jmorl.paper.results import Pair, TargetRow, pair_of
-from jmorl.paper.statistics import Difference
+from jmorl.paper.plan import named
+from jmorl.paper.results import Pair, pair_of
 
 MISSING = "Not to be judged yet: runs are missing."
 METHODS = ("interactive", "pgmorl")  # those published

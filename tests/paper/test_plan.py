@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from jmorl.arguments import PAPER_ITEMS
+from jmorl.experiments.cells import Places, distinct, missing
+from jmorl.experiments.record import read_record
 from jmorl.paper.claims import CURVE_STATEMENTS, FINALS_STATEMENTS
 from jmorl.paper.data import honest, published
+from jmorl.paper.pilots import proposals
 from jmorl.paper.plan import (
     CAR,
     CHEETAH,
@@ -19,11 +22,7 @@ from jmorl.paper.plan import (
     USER_SEEDS,
     USER_STEPS,
     Plan,
-    distinct,
 )
-from jmorl.paper.record import read_record
-from jmorl.paper.runner import Places, missing
-from jmorl.paper.targets import proposals
 
 UNITS = ("raw", "paper")
 FULL, QUICK = Plan(), Plan(quick=True)
@@ -113,7 +112,7 @@ def test_pgmorl_has_a_second_row_with_the_papers_warm_up_on_halfcheetah_made_las
     for name, seeds in (("table2", QUICK.seeds_of(ITEMS["table2"])), ("fig7", USER_SEEDS), ("fig8", USER_SEEDS)):
         plan = QUICK if name == "table2" else FULL  # its targets may not be fixed yet
         cells = plan.cells(ITEMS[name], "raw")
-        later = [cell for cell in cells if cell.later]
+        later = plan.later(ITEMS[name], "raw")
         assert cells[-len(later) :] == later and [cell.config.seed for cell in later] == list(seeds)
         assert all(cell.config.method == "pgmorl" and SHORTER in cell.key for cell in later)
     shorter = FULL.pgmorl(ITEMS["fig7"], "raw", 1, SHORTER).config
@@ -121,8 +120,8 @@ def test_pgmorl_has_a_second_row_with_the_papers_warm_up_on_halfcheetah_made_las
     own = FULL.pgmorl(ITEMS["fig7"], "raw", 1).config
     assert own.population.warmup_iterations == 120 and shorter == own.replace(population={"warmup_iterations": 40})
     others = [("fig5", "raw"), ("fig7", "paper"), ("fig11", "raw")]
-    assert not any(cell.later for name, units in others for cell in FULL.cells(ITEMS[name], units))
-    assert not any(cell.later for cell in FULL.pilots(CHEETAH))
+    assert not any(FULL.later(ITEMS[name], units) for name, units in others)
+    assert not any(SHORTER in cell.key for cell in FULL.pilots(CHEETAH))
 
 
 def test_seeds_are_the_papers_and_pilots_have_others():

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from jmorl.decision.utility import USERS
+from jmorl.experiments.record import RunRecord
 from jmorl.paper.analysis import generations_within, pooled_front
 from jmorl.paper.plan import METHODS, USER_STEPS
-from jmorl.paper.record import RunRecord
 from jmorl.search.bounds import within
 
 RELAXATION = 0.025  # of the range of the pooled front

@@ -8,7 +8,7 @@ import pytest
 
 import envs
 from jmorl.events import GenerationFinished
-from jmorl.paper.record import (
+from jmorl.experiments.record import (
     RecordError,
     broken_record,
     is_record_of,
@@ -70,7 +70,7 @@ def test_a_record_says_what_the_run_did(run):
     units = generations[-1].state.units
     expected = [None] * 3 if units is None else pytest.approx(units.deviation.tolist(), rel=1e-6)
     assert list(record.generations[-1].sigma) == expected
-    assert record.fault is None and record.in_paper_units == (units is not None)
+    assert record.fault is None
     for policy, kept in zip(policies, record.policies, strict=True):
         assert kept.discounted == (None if units is None else pytest.approx(policy.discounted.tolist(), rel=1e-6))
 
