@@ -62,8 +62,8 @@ def _how_surely(target: str, difference: Difference) -> str:
 
 
 def explanations(published: PublishedTable, rows: Sequence[TargetRow]) -> list[str]:
-    """Paper units, one target: for each method whose successes, or whose place, are not the published ones, which of
-    moving units, a defect that is not copied, or our own shortfall the numbers point to.
+    """Explain the differences on one target in paper units: a sentence for each method whose successes, or place, are
+    not the published ones. The cause is moving units, a defect that is not copied, or our own shortfall.
     """
     pair = pair_of(rows)
     if pair is None:
@@ -113,7 +113,7 @@ def _cause_of_less(row: TargetRow) -> str:
 
 
 def drift_told(row: TargetRow) -> str:
-    """Whether successes in paper units are of policies or of units."""
+    """Say whether successes in paper units are owed to policies or to units."""
     of = "1 success" if row.times.successes == 1 else f"{row.times.successes} successes"
     owed = drifted(row)
     if not owed:

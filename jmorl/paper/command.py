@@ -66,7 +66,7 @@ class _Part:
 
 
 def _make_all(parts: Sequence[_Part], places: Places, together: int, console: Console) -> None:
-    """Every part's missing runs. What two parts share is made with the first."""
+    """Make every part's missing runs. What two parts share is made with the first."""
     with StopSignals("stopping after this generation; the same command goes on from there") as stop:
         for part in parts:
             name = f"{part.name}, {part.units} units"

@@ -1,4 +1,4 @@
-"""What units that move during a run do to its results, and to the successes of runs to a target.
+"""Drift: how units that move during a run change its results, and the successes of runs to a target.
 
 Letters: N policies, M objectives.
 """

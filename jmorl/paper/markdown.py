@@ -16,7 +16,7 @@ from jmorl.paper.results import Curves
 
 
 def published_steps(row: PublishedRow, cap: int) -> str:
-    """Mean and deviation; where the one printed is another, it comes first."""
+    """Write mean and deviation; where the printed deviation is another, it comes first."""
     if row.mean_steps is None or row.std_steps is None:
         return f'≥ {cap / 1e6:.2f} ("No results")'
     if row.std_printed is None:
@@ -25,7 +25,7 @@ def published_steps(row: PublishedRow, cap: int) -> str:
 
 
 def side_by_side(published: PublishedTable, rows: Mapping[str, Sequence[TargetRow]]) -> str:
-    """A published table beside ours, in all units there are: million steps used, and how many runs succeed."""
+    """Lay out a published table beside ours, in all units there are: million steps used, and successes."""
     head = ["target", "method", "published", "reached"]
     head += [cell for units in rows for cell in (f"{units} units", "reached")]
     methods = dict.fromkeys(
@@ -51,7 +51,7 @@ def _ours(row: TargetRow | None, wanted: bool) -> list[str]:
 
 
 def costs(rows: Sequence[TargetRow], published: PublishedTable) -> str:
-    """What a run takes of a machine, and of a person."""
+    """Lay out the time that a run takes of a machine, and of a person."""
     head = ["target", "method", "time per run", "published", "questions", "before the first question"]
     head += ["between questions"]
     lines = []
@@ -72,12 +72,12 @@ def costs(rows: Sequence[TargetRow], published: PublishedTable) -> str:
 
 
 def _time(seconds: float) -> str:
-    """Empty for NaN, which is not known."""
+    """Write a duration; nothing for NaN, which is not known."""
     return "" if np.isnan(seconds) else duration(seconds)
 
 
 def waits(rows: Sequence[Curves], steps: int) -> str:
-    """What the runs of a figure ask of a person; PGMORL's, which asks at the end, up to the figure's `steps`."""
+    """Lay out what a figure's runs ask of a person; PGMORL asks at the end, here after the figure's `steps`."""
     lines = []
     for row in rows:
         if row.method == "interactive":
@@ -94,7 +94,7 @@ def _waiting_cells(records: Sequence[RunRecord]) -> list[str]:
 
 
 def final_waits(found: Mapping[str, Finals], steps: int) -> str:
-    """The same of final policies: E-NAUTILUS asks when all the runs whose archives it pools have ended."""
+    """Lay out the same for final policies: E-NAUTILUS asks when all the runs whose archives it pools have ended."""
     lines = []
     for user, finals in found.items():
         lines.append([user, "interactive", *_waiting_cells(finals.runs)])
@@ -104,7 +104,7 @@ def final_waits(found: Mapping[str, Finals], steps: int) -> str:
 
 
 def honesty(rows: Sequence[TargetRow]) -> str:
-    """Paper units: what was reached, in raw returns, and how far the units had moved after equally many steps."""
+    """Lay out for paper units the raw returns of successes, and how far units had moved after equally many steps."""
     head = ["target", "method", "raw returns of what reached it, mean", "sigma after the warm-up"]
     head += ["sigma after as many steps in both methods", "reached with generation 0", "owed to moving units"]
     lines = []
@@ -120,7 +120,7 @@ def honesty(rows: Sequence[TargetRow]) -> str:
 
 
 def _sigmas(row: TargetRow, rows: Sequence[TargetRow], seed: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Of the row's run with a seed: after the warm-up, and when the shorter of all methods' runs ends."""
+    """Return sigma of the row's run with a seed: after the warm-up, and when the shortest of all methods' runs ends."""
     record = row.records[row.seeds.index(seed)]
     peers = [
         other.records[other.seeds.index(seed)] for other in rows if other.target == row.target and seed in other.seeds
@@ -130,7 +130,7 @@ def _sigmas(row: TargetRow, rows: Sequence[TargetRow], seed: int) -> tuple[np.nd
 
 
 def ends(rows: Sequence[Curves]) -> str:
-    """Utilities after the last generation, with every seed; with those of the buffer where there are any."""
+    """Lay out utilities after the last generation, seed by seed, with those of the buffer where there are any."""
     buffers = any(row.buffer is not None for row in rows)
     head = ["user", "method", "mean", "seed by seed"] + ["buffer (authors)", "buffer within bounds (authors)"] * buffers
     lines = []
@@ -146,7 +146,7 @@ def ends(rows: Sequence[Curves]) -> str:
 
 
 def final_table(found: Mapping[str, Finals], weights: Mapping[str, Sequence[float]]) -> str:
-    """Every final policy and its utility; struck through if another final policy dominates it."""
+    """Lay out every final policy and its utility; struck through if another final policy dominates it."""
     lines = []
     for user, finals in found.items():
         w = np.array(weights[user])

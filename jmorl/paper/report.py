@@ -96,7 +96,7 @@ def _finals_part(plan: Plan, item: Item, units: str, records: Records) -> list[s
 
 
 def _table_section(table: PublishedTable, item: Item, rows: Mapping[str, Sequence[TargetRow]]) -> list[str]:
-    """A table of steps to targets: side by side, verdicts, and in each kind of units what is behind them."""
+    """Write up a table of steps to targets: side by side, verdicts, and in each kind of units what is behind them."""
     parts = [markdown.side_by_side(table, rows), DEVIATIONS]
     parts.append(SWAPPED if any(row.std_printed for row in table.rows) else "")
     for units, each in rows.items():

@@ -29,7 +29,7 @@ class Pair:
 
 
 def pair_of(rows: Sequence[TargetRow]) -> Pair | None:
-    """Of the rows of one target; None if runs of one of the methods are missing.
+    """Return the pair of one target's rows; None if runs of one of the methods are missing.
 
     Better is what reaches the target more often, then with fewer steps.
     """
@@ -44,7 +44,7 @@ def pair_of(rows: Sequence[TargetRow]) -> Pair | None:
 
 
 def target_rows(plan: Plan, item: Item, units: str, records: Records) -> list[TargetRow]:
-    """A row for each target and method that has a run."""
+    """Return a row for each target and method that has a run."""
     rows = []
     for name, values in plan.targets(item.env, units).items():
         for method in plan.methods(item, units):
@@ -55,7 +55,7 @@ def target_rows(plan: Plan, item: Item, units: str, records: Records) -> list[Ta
 
 
 def _there(plan: Plan, item: Item, units: str, method: str, goal: str, records: Records) -> dict[int, RunRecord]:
-    """The runs there are, by seed."""
+    """Return the runs there are, by seed."""
     keys = {seed: plan.cell(item, units, method, goal, seed).key for seed in plan.seeds_of(item)}
     return {seed: records[key] for seed, key in keys.items() if key in records}
 
@@ -84,7 +84,7 @@ class Curves:
 
 
 def curves(plan: Plan, item: Item, units: str, records: Records) -> list[Curves]:
-    """For each user and method that has a run."""
+    """Return the curves of each user and method that has a run."""
     found = []
     for user, weights in plan.user_weights(item, units).items():
         for method in plan.methods(item, units):
@@ -110,7 +110,7 @@ def _curves(
 
 
 def advantage(one: Curves, other: Curves) -> Difference | None:
-    """How much more the first has at the end, on the seeds that both have; None if there is none."""
+    """Return how much more the first has at the end, on the seeds of both; None if they share no seed."""
     pairs = [
         one.last[one.seeds.index(seed)] - other.last[other.seeds.index(seed)]
         for seed in one.seeds
@@ -120,7 +120,7 @@ def advantage(one: Curves, other: Curves) -> Difference | None:
 
 
 def curve_pairs(rows: Sequence[Curves]) -> Iterator[tuple[Curves, Curves, Difference]]:
-    """For each user with runs of both: the interactive method, the row of PGMORL that ends highest, the advantage."""
+    """Yield for each user with runs of both the interactive method, PGMORL's highest-ending row, and the advantage."""
     for user in dict.fromkeys(row.user for row in rows):
         ours = [row for row in rows if row.user == user and row.method == "interactive"]
         theirs = [row for row in rows if row.user == user and row.method != "interactive"]
@@ -132,7 +132,7 @@ def curve_pairs(rows: Sequence[Curves]) -> Iterator[tuple[Curves, Curves, Differ
 
 
 def final_policies(plan: Plan, item: Item, units: str, records: Records) -> dict[str, Finals]:
-    """For each user for whom both methods have all their runs: pooling is over all seeds."""
+    """Return the final policies of each user for whom both methods have all their runs: pooling is over all seeds."""
     found = {}
     seeds = plan.seeds_of(item)
     for user, weights in plan.user_weights(item, units).items():
