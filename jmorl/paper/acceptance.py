@@ -1,4 +1,8 @@
-"""What was to be shown: in raw units that interaction helps, in paper units why our numbers are not the published."""
+"""Acceptance of the results: in raw units by a criterion, in paper units by explaining what is not as published.
+
+The acceptance criterion, for each target: the interactive method succeeds as often as PGMORL and as the best published
+row, and for targets B and C in fewer steps than PGMORL.
+"""
 
 from collections.abc import Sequence
 
@@ -11,7 +15,8 @@ from jmorl.paper.plan import named
 from jmorl.paper.results import Pair, pair_of
 from jmorl.paper.verdicts import METHODS, against_published, order, published_order, shown, steps_saved
 
-FASTER = ("B", "C")  # targets for which fewer steps are asked for, too
+ACCEPTANCE_CRITERION = "The bar: as many successes as PGMORL and as the best published row, for B and C in fewer steps."
+FASTER = ("B", "C")  # targets for which the criterion asks for fewer steps, too
 
 UNCOPIED = (
     "by elimination, of what their program does and this one does not: its bounds in place of the chosen policy's "
@@ -20,10 +25,8 @@ UNCOPIED = (
 )
 
 
-def raw_bar(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
-    """One target: whether the interactive method succeeds as often as PGMORL and as the best published row, and for B
-    and C with fewer steps; with the mechanism wherever it does not.
-    """
+def acceptance_verdict(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
+    """Say whether one target meets the acceptance criterion; with the mechanism of the search where it does not."""
     target, pair = rows[0].target, pair_of(rows)
     if pair is None:
         return f"Target {target}: not to be judged yet, as runs of one method are missing."
@@ -48,7 +51,7 @@ def raw_bar(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
 
 
 def _misses(pair: Pair, best: float) -> list[str]:
-    """What is short of the bar. `best`: share of the runs of the best published row that succeed."""
+    """Return what the criterion asks for and is not met. `best`: the successful share of the best published row."""
     ours, theirs = (row.times.successes / len(row.seeds) for row in pair.rows)
     return [
         *(["it succeeds less often than PGMORL"] if ours < theirs else []),
@@ -58,6 +61,7 @@ def _misses(pair: Pair, best: float) -> list[str]:
 
 
 def _how_surely(target: str, difference: Difference) -> str:
+    """Write how sure the steps saved are, where the criterion asks for them."""
     return f", in steps {difference.certainty}" if target in FASTER else ""
 
 
