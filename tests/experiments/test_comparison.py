@@ -2,6 +2,7 @@
 
 import pytest
 
+from jmorl.config import ConfigError
 from jmorl.decision.protocol import Answer, DecisionMaker
 from jmorl.experiments import Contender, compare
 from jmorl.learning.population import Population, TrainingFault
@@ -47,11 +48,57 @@ def test_the_tables_are_of_all_contenders_targets_and_seeds(contenders, tmp_path
     assert again.markdown() == text and Stubborn.asked == 10
 
 
-def test_unequal_budgets_are_refused(contenders, tmp_path):
-    other = Contender(contenders["pgmorl"].config.replace(steps=4 * 3 * 16 * 8))
-    with pytest.raises(ValueError, match=r"within one budget of steps; theirs are: stubborn 2112, shorter 1536"):
-        compare(ThreeWays.id, {"stubborn": contenders["stubborn"], "shorter": other}, TARGETS, (1,), tmp_path)
-    assert not list(tmp_path.iterdir())
+def test_all_that_is_wrong_is_said_before_anything_is_made(contenders, tmp_path):
+    shorter = Contender(contenders["pgmorl"].config.replace(steps=4 * 3 * 16 * 8))
+    with pytest.raises(ConfigError) as error:
+        compare(
+            ThreeWays.id,
+            {"stubborn": contenders["stubborn"], "a/b": shorter},
+            {"near": (-200.0, -200.0), "nowhere": (0.0, float("nan"), 0.0)},
+            (1, 1, -3),
+            tmp_path / "out",
+        )
+    problems = error.value.problems
+    assert problems[:3] == [
+        "contender 'a/b': files are named after it; write it with letters, digits, spaces and . _ + = -",
+        "seed 1 is given 2 times",
+        "contenders are compared within one budget of steps; theirs are: stubborn 2112, a/b 1536",
+    ]
+    assert [problem.split(": ")[:2] for problem in problems[3:]] == [
+        ["stubborn, target near", "user"],
+        ["stubborn, target near", "seed"],
+        ["stubborn, target nowhere", "user"],
+    ]
+    assert "one number for each of 3 objectives, not 2" in problems[3] and "finite" in problems[5]
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_to_compare_is_refused(contenders, tmp_path):
+    for arguments, missing in (
+        (({}, TARGETS, (1,)), "contender"),
+        ((contenders, {}, (1,)), "target"),
+        ((contenders, TARGETS, ()), "seed"),
+    ):
+        with pytest.raises(ConfigError, match=f"there is no {missing} to compare with"):
+            compare(ThreeWays.id, *arguments, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_two_runs_never_share_a_file(contenders, tmp_path):
+    some = dict.fromkeys(("a", "a-target-b"), contenders["pgmorl"])
+    goals = dict.fromkeys(("b-target-c", "c"), TARGETS["near"])
+    with pytest.raises(ConfigError, match="two runs would have the same name"):
+        compare(ThreeWays.id, some, goals, (1,), tmp_path / "out")
+
+
+def test_targets_that_differ_in_the_last_digit_are_other_runs(contenders, tmp_path):
+    """Otherwise a run that ended with the easier target would count as one to the harder."""
+    pgmorl = {"pgmorl": contenders["pgmorl"]}
+    users = []
+    for last in (-200.0, -200.00000001):
+        (row,) = compare(ThreeWays.id, pgmorl, {"near": (-200.0, -200.0, last)}, (1,), tmp_path).rows
+        users.append(row.records[0].config["user"])
+    assert users == ["target=-200,-200,-200", "target=-200,-200,-200.00000001"]
 
 
 def test_a_run_that_breaks_down_counts_as_not_reaching_its_target(contenders, tmp_path, monkeypatch):
