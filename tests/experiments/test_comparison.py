@@ -1,10 +1,14 @@
 """The comparison as a tool: somebody's own decision maker, on somebody's own environment, to the same tables."""
 
+import subprocess
+import sys
+
 import pytest
 
+import jmorl
+from jmorl import Contender, compare
 from jmorl.config import ConfigError
 from jmorl.decision.protocol import Answer, DecisionMaker
-from jmorl.experiments import Contender, compare
 from jmorl.learning.population import Population, TrainingFault
 from tests.registered import ThreeWays
 
@@ -112,3 +116,13 @@ def test_a_run_that_breaks_down_counts_as_not_reaching_its_target(contenders, tm
     text = found.markdown()
     assert "| near | pgmorl | 0.00 [0.00, 0.00] | 0 of 2 |" in text and "≥ 0.00 (broke down at 0.00 M)" in text
     assert "nan" not in text
+
+
+def test_a_program_that_only_trains_does_not_import_comparisons():
+    program = "import sys, jmorl; assert 'jmorl.experiments' not in sys.modules; assert 'compare' in dir(jmorl)"
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_an_unknown_name_is_still_an_error():
+    with pytest.raises(AttributeError, match="module 'jmorl' has no attribute 'compere'"):
+        jmorl.compere  # noqa: B018
