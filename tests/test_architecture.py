@@ -106,6 +106,14 @@ def test_one_place_makes_the_runs_of_comparisons():
             assert trains == (path == ROOT / "jmorl" / "experiments" / "runner.py"), path
 
 
+def test_comparisons_are_of_any_methods():
+    """Nothing in them depends on which method a run has."""
+    for path in files("jmorl.experiments"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            compared = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
+            assert not any(isinstance(each, ast.Attribute) and each.attr == "method" for each in compared), path
+
+
 def test_only_the_programs_compile_training():
     """One place decides what is traced: elsewhere in `learning` there is no `jit`."""
     for path in files("jmorl.learning"):
