@@ -21,11 +21,12 @@ from rich.table import Table
 from benchmarks.arms import add_arms, arms
 from jmorl.config import Config
 from jmorl.decision.utility import USERS
+from jmorl.experiments.cells import Cell, Places, missing
+from jmorl.experiments.record import RunRecord, read_record
+from jmorl.experiments.runner import make
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.paper.analysis import generations_within, greatest_utility
-from jmorl.paper.plan import CHEETAH, ITEMS, USER_STEPS, Cell, Plan
-from jmorl.paper.record import RunRecord, read_record
-from jmorl.paper.runner import Places, make, missing
+from jmorl.paper.plan import CHEETAH, ITEMS, USER_STEPS, Plan
 from jmorl.search.pareto import hypervolume
 
 STEPS_OF_AN_EPISODE = 1000

@@ -4,6 +4,7 @@ The names here and in `envs` are all that a program needs; see the README.
 """
 
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
 from envs import Objective
 from jmorl.config import Config, ConfigError, resolve
@@ -36,6 +37,21 @@ from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 
 __version__ = version("jmorl")
+if TYPE_CHECKING:
+    from jmorl.experiments import Comparison, Contender, compare
+else:
+
+    def __getattr__(name: str) -> Any:
+        """Import what comparisons need when one of its names is used: a program that only trains does without."""
+        if name not in ("Comparison", "Contender", "compare"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from jmorl.experiments import comparison
+
+        return getattr(comparison, name)
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})
+
 
 __all__ = [
     "Adjust",
@@ -44,9 +60,11 @@ __all__ = [
     "AnyQuestion",
     "Back",
     "Choose",
+    "Comparison",
     "Compiled",
     "Config",
     "ConfigError",
+    "Contender",
     "Decided",
     "DecisionMaker",
     "Event",
@@ -72,6 +90,7 @@ __all__ = [
     "TrainingFault",
     "WeightQuestion",
     "branch",
+    "compare",
     "load_policy",
     "navigate",
     "read_run",

@@ -23,25 +23,30 @@ MAY_IMPORT = {
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},
     "jmorl.state": {"jmorl.config", "jmorl.search", "jmorl.units"},
+    "jmorl.events": {"jmorl.decision", "jmorl.search", "jmorl.state"},
     "jmorl.loop": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),
-        *("jmorl.state", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.scoring"),
+        *("jmorl.search", "jmorl.state", "jmorl.units"),
     },
     "jmorl.storage": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.loop", "jmorl.search"),
-        *("jmorl.state", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.loop"),
+        *("jmorl.search", "jmorl.state", "jmorl.units"),
     },
     "jmorl.report": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
-        *("jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.learning"),
+        *("jmorl.playback", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
     },
     "jmorl.studio": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.playback", "jmorl.report"),
-        *("jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.playback"),
+        *("jmorl.report", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage", "jmorl.units"),
+    },
+    "jmorl.experiments": {
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.loop", "jmorl.search"),
+        "jmorl.storage",
     },
     "jmorl.paper": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.loop"),
-        *("jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.experiments"),
+        *("jmorl.report", "jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}
@@ -84,6 +89,29 @@ def test_no_part_may_import_itself_by_way_of_others():
 def test_every_part_is_in_the_list():
     parts = {part(".".join(path.relative_to(ROOT).with_suffix("").parts)) for path in (ROOT / "jmorl").rglob("*.py")}
     assert parts - {"jmorl.__init__", "jmorl.__main__", "jmorl.cli"} == set(MAY_IMPORT) - {"envs"}
+
+
+def test_no_package_hides_one_of_its_modules_behind_a_name_that_it_exports():
+    for path in [*files("envs"), *(ROOT / "jmorl").rglob("__init__.py")]:
+        if path.name == "__init__.py":
+            modules = {each.stem for each in path.parent.iterdir()}
+            assert not modules & {name.rpartition(".")[2] for name in imports(path)} - {"__init__"}, path
+
+
+def test_one_place_makes_the_runs_of_comparisons():
+    """Runs made elsewhere are another file beside it: nothing else trains, or opens a run to go on with it."""
+    for name in ("jmorl.experiments", "jmorl.paper"):
+        for path in files(name):
+            trains = any(module.startswith(("jmorl.learning.", "jmorl.storage.resume.")) for module in imports(path))
+            assert trains == (path == ROOT / "jmorl" / "experiments" / "runner.py"), path
+
+
+def test_comparisons_are_of_any_methods():
+    """Nothing in them depends on which method a run has."""
+    for path in files("jmorl.experiments"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            compared = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
+            assert not any(isinstance(each, ast.Attribute) and each.attr == "method" for each in compared), path
 
 
 def test_only_the_programs_compile_training():

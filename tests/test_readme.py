@@ -63,3 +63,15 @@ def test_what_is_done_from_python_works_line_by_line(small, tmp_path, capsys):
     exec(navigated, names)
     assert "NavigationFinished\n" in capsys.readouterr().out
     assert names["event"].chosen in names["front"]
+
+
+def test_contenders_are_compared_as_the_readme_does(small, tmp_path, capsys):
+    (comparison,) = blocks("The paper's experiments")
+    imported = re.findall(r"^(?:from|import) (\S+)", comparison, re.MULTILINE)
+    assert imported == ["pathlib", "jmorl"]  # nothing deeper
+    exec(comparison, {})
+    assert small[-1].steps == 5_000_000
+    text = capsys.readouterr().out
+    assert text == (tmp_path / "runs" / "mine" / "REPORT.md").read_text() + "\n"
+    assert "| A | mine |" in text and "saved against pgmorl" in text
+    assert len(list(tmp_path.glob("runs/mine/records/*.json"))) == 2 * 3

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jmorl.paper.statistics import Times, difference, interval, saved
+from jmorl.experiments.statistics import Times, difference, interval, saved
 
 STEPS = st.one_of(st.none(), st.integers(1, 40).map(lambda g: g * 0.24))
 

@@ -1,57 +1,32 @@
-"""Making the runs of a comparison: what is done is skipped, what was interrupted goes on.
+"""Make the runs of a comparison in this process: what was interrupted goes on.
 
-records/KEY.json  what is kept of a run that ended or broke down; delete it, and the run is made again
-work/KEY/         its run folder, from which it is resumed
+Comparisons get their runs from `make` alone. Runs made in another place (on the machines of a cluster, say) are another
+module, whose `make` takes the same arguments and leaves the same records.
 """
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
-from itertools import groupby
+from dataclasses import replace
 from pathlib import Path
 
 import envs
-from jmorl.config import Config, ConfigError, resolve
+from jmorl.config import ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.events import Event
+from jmorl.experiments.cells import Cell, Places
+from jmorl.experiments.record import RunRecord, broken_record, record_of, write_record
 from jmorl.learning.population import TrainingFault
 from jmorl.learning.stack import Stack, StackedPopulation
-from jmorl.paper.plan import Cell
-from jmorl.paper.record import RunRecord, broken_record, is_record_of, read_record, record_of, write_record
 from jmorl.storage.resume import AlreadyFinished, Continued, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 
 Watch = Callable[[Cell, Event], None]
+MakeUser = Callable[[], DecisionMaker]
 
 
-@dataclass(frozen=True)
-class Places:
-    """Where the runs of a comparison are kept."""
-
-    records: Path
-    work: Path
-
-    def record(self, cell: Cell) -> Path:
-        return self.records / f"{cell.key}.json"
-
-
-def missing(cells: Sequence[Cell], places: Places) -> list[Cell]:
-    """The cells that have no record, or one of other settings. Raises RecordError for a file that is none."""
-    return [cell for cell in cells if not is_record_of(places.record(cell), cell.config)]
-
-
-def known(cells: Sequence[Cell], places: Places) -> dict[str, RunRecord]:
-    """The records there are, by the cell's key."""
-    return {
-        cell.key: read_record(places.record(cell)) for cell in cells if is_record_of(places.record(cell), cell.config)
-    }
-
-
-def make(
-    cells: Sequence[Cell], places: Places, watch: Watch, user: Callable[[], DecisionMaker] | None = None
-) -> list[RunRecord]:
+def make(cells: Sequence[Cell], places: Places, watch: Watch, user: MakeUser | None = None) -> list[RunRecord]:
     """Make runs of one `shape`, or what is left of them, together in one program, and keep their records.
 
     Several have a thread each, in which `watch` and the users are called; one alone has the caller's. `user` defaults
@@ -62,7 +37,7 @@ def make(
 
     def make_one(cell: Cell, population: StackedPopulation | None) -> RunRecord:
         with population or nullcontext():
-            record = replace(_made(cell, places, watch, user, population), together=keys)
+            record = replace(_made(cell, places.folder(cell), watch, user, population), together=keys)
         write_record(places.record(cell), record)
         return record
 
@@ -74,26 +49,10 @@ def make(
         return list(pool.map(make_one, cells, stack.populations))
 
 
-def groups(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
-    """The cells in order, up to so many that follow each other and have one shape at a time."""
-    for _, alike in groupby(cells, lambda cell: shape(cell.config)):
-        some = list(alike)
-        yield from (some[start : start + most] for start in range(0, len(some), most))
-
-
-def shape(config: Config) -> Hashable:
-    """Equal for runs that can share a program."""
-    return config.env, config.learning
-
-
 def _made(
-    cell: Cell,
-    places: Places,
-    watch: Watch,
-    user: Callable[[], DecisionMaker] | None,
-    population: StackedPopulation | None,
+    cell: Cell, folder: Path, watch: Watch, user: MakeUser | None, population: StackedPopulation | None
 ) -> RunRecord:
-    folder = places.work / cell.key
+    """Make one run, or what is left of it, and return its record."""
     try:
         continued = _begun(cell, folder)
     except AlreadyFinished:
@@ -108,7 +67,7 @@ def _made(
 
 
 def _begun(cell: Cell, folder: Path) -> Continued:
-    """The run as far as it is; from the beginning if what is there was made with other settings."""
+    """Open the run as far as it is; begin it anew if what is there was made with other settings."""
     try:
         begun = resolve(file=folder / "config.toml").identity() == cell.config.identity()
     except ConfigError:

@@ -8,7 +8,7 @@ import pytest
 
 import envs
 from jmorl.events import GenerationFinished
-from jmorl.paper.record import (
+from jmorl.experiments.record import (
     RecordError,
     broken_record,
     is_record_of,
@@ -70,7 +70,7 @@ def test_a_record_says_what_the_run_did(run):
     units = generations[-1].state.units
     expected = [None] * 3 if units is None else pytest.approx(units.deviation.tolist(), rel=1e-6)
     assert list(record.generations[-1].sigma) == expected
-    assert record.fault is None and record.in_paper_units == (units is not None)
+    assert record.fault is None
     for policy, kept in zip(policies, record.policies, strict=True):
         assert kept.discounted == (None if units is None else pytest.approx(policy.discounted.tolist(), rel=1e-6))
 
@@ -119,7 +119,7 @@ def test_what_a_run_had_when_it_broke_down_is_kept(run, tmp_path):
     (copy / "result.json").unlink()
     record = broken_record(copy, config, "agent 1: loss is not finite")
     assert (record.reason, record.chosen, record.fault) == ("broke down", None, "agent 1: loss is not finite")
-    assert record.total_steps == generations[-1].steps and record.digest == config.digest()
+    assert record.total_steps == generations[-1].steps and record.digest == config.identity()
     (copy / "metrics.csv").unlink()
     nothing = broken_record(copy, config, "agent 1: loss is not finite")
     assert (nothing.total_steps, nothing.total_seconds, nothing.objectives) == (0, 0.0, record.objectives)

@@ -1,8 +1,8 @@
 """Records of runs that never were."""
 
-from jmorl.paper.plan import CAR
-from jmorl.paper.record import GenerationRecord, PolicyRecord, QuestionRecord, RunRecord
+from jmorl.experiments.record import GenerationRecord, PolicyRecord, QuestionRecord, RunRecord
 
+CAR = "mo-mountaincarcontinuous-v0"
 ITERATION = 24_000  # steps, at the paper's sizes on MountainCar
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from jmorl.paper.pilots import proposals, propose
 from jmorl.paper.plan import CAR
-from jmorl.paper.targets import proposals, propose
-from tests.paper.made import ITERATION, record
+from tests.experiments.made import ITERATION, record
 
 STEPS = 20 * ITERATION
 START = [(-300.0, -90.0)]  # nobody's target

@@ -1,16 +1,16 @@
-"""What a search was doing, and what it asked of a person."""
+"""Diagnostics of runs: how a search got on, and what it asked of a person."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from jmorl.paper.record import RunRecord
+from jmorl.experiments.record import RunRecord
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Why a search gets on or not: medians and means over the generations of runs, the warm-up left out."""
+    """How searches got on: medians and means over the generations of runs, the warm-up left out."""
 
     candidates: float  # median number of policies that could be continued
     alone: float  # share of generations with nothing but the choice to continue
@@ -20,7 +20,7 @@ class Mechanism:
 
 
 def mechanism(records: Sequence[RunRecord]) -> Mechanism:
-    """Over all generations of the runs."""
+    """Sum up how the searches of these runs got on."""
     candidates = [generation.candidates for record in records for generation in record.generations[1:]]
     repeated: list[bool] = []
     predicted: list[float] = []
@@ -48,7 +48,7 @@ def mechanism(records: Sequence[RunRecord]) -> Mechanism:
 
 @dataclass(frozen=True)
 class Waiting:
-    """What a method asks of a person, over runs; compilation not counted."""
+    """The questions and waiting times of a person, over runs; compilation not counted."""
 
     questions: float  # mean, the final one included
     before_first: float  # mean seconds: the warm-up, or the whole run if it asks only at its end
@@ -56,7 +56,7 @@ class Waiting:
 
 
 def waiting(records: Sequence[RunRecord]) -> Waiting:
-    """Over at least one run."""
+    """Sum up what at least one run asked of a person."""
     return Waiting(
         float(np.mean([len(record.questions) for record in records])),
         float(np.mean([_before_first(record) for record in records])),
@@ -65,13 +65,14 @@ def waiting(records: Sequence[RunRecord]) -> Waiting:
 
 
 def _before_first(record: RunRecord) -> float:
-    """A question before generation g is asked when the one before has ended."""
+    """Return the seconds before the first question: one before generation g comes when the generation before ends."""
     if not record.questions:
         return record.total_seconds
     return float(record.seconds[record.questions[0].generation - 1])
 
 
 def _between(record: RunRecord) -> list[float]:
+    """Return the seconds between each question and the next."""
     asked = [question.generation for question in record.questions]
     ends = record.seconds
     return [float(ends[after - 1] - ends[before - 1]) for before, after in zip(asked, asked[1:], strict=False)]

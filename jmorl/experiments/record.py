@@ -1,4 +1,4 @@
-"""What is kept of a run for good: one small JSON file, from which every number of the reports is made.
+"""The record of a run: one small JSON file, from which every number of a comparison is made.
 
 Letters: N policies, M objectives, G generations.
 """
@@ -31,7 +31,7 @@ DIGITS = 7  # significant ones; scores are float32 sums
 
 
 class RecordError(ValueError):
-    """A file that is no record of a run, or one of another format."""
+    """A file that is not the record of a run, or has another format."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class GenerationRecord:
 
     @property
     def seconds(self) -> float:
-        """What the generation took, apart from compilation."""
+        """The time that the generation took, compilation not counted."""
         return self.select_seconds + self.train_seconds + self.evaluate_seconds
 
 
@@ -78,7 +78,7 @@ class QuestionRecord:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """A run that has ended, or one that broke down and has what it had until then, perhaps no generation at all."""
+    """A run that has ended, or broke down; then with what it had until then, perhaps no generation at all."""
 
     digest: str  # of its config
     config: dict[str, Any]
@@ -111,11 +111,12 @@ class RunRecord:
 
     @property
     def steps(self) -> np.ndarray:  # [G + 1]
+        """Environment steps used for learning, after each generation."""
         return np.array([generation.steps for generation in self.generations])
 
     @property
     def seconds(self) -> np.ndarray:  # [G + 1]
-        """What somebody at the screen waited, since the start, compilation not counted.
+        """How long a person had waited since the start, after each generation; compilation not counted.
 
         NaN if the run was made together with others: nobody waits for those.
         """
@@ -135,12 +136,8 @@ class RunRecord:
         """How long the machine was busy with the run and those made together with it."""
         return sum(generation.seconds for generation in self.generations)
 
-    @property
-    def in_paper_units(self) -> bool:
-        return any(None not in generation.sigma for generation in self.generations)
-
     def bounds(self, generation: int) -> np.ndarray:  # [M]
-        """Those in force in a generation, -inf where there were none."""
+        """Return the bounds in force in a generation, -inf where there were none."""
         return np.array([-np.inf if bound is None else bound for bound in self.generations[generation].bounds])
 
 
@@ -148,14 +145,14 @@ _RECORD: TypeAdapter[RunRecord] = TypeAdapter(RunRecord)
 
 
 def record_of(run: StoredRun) -> RunRecord:
-    """What is kept of a run folder. Raises RecordError for a run that has not ended."""
+    """Return the record of a run folder. Raises RecordError for a run that has not ended."""
     if run.result is None or run.chosen is None:
         raise RecordError(f"the run in {run.path} has not ended")
     return _record(run, run.result["reason"], run.chosen.id)
 
 
 def broken_record(path: Path, config: Config, fault: str) -> RunRecord:
-    """What is kept of a run folder whose run broke down."""
+    """Return the record of a run folder whose run broke down, with the reason as its `fault`."""
     try:
         return _record(read_run(path), BROKEN, None, fault)
     except StoredRunError:  # it broke down in the warm-up
@@ -226,7 +223,7 @@ def _record(run: StoredRun, reason: str, chosen: int | None, fault: str | None =
 
 
 def memberships(run: StoredRun) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Who was in the archive and who in the buffer after each generation, by id.
+    """Yield the ids of the archive's members and of the buffer's after each generation.
 
     The folder has the last ones only; those before follow from the policies in the order in which they came, P at a
     time, and from the bounds.
@@ -270,7 +267,7 @@ def read_record(path: Path) -> RunRecord:
 
 
 def is_record_of(path: Path, config: Config) -> bool:
-    """Whether the file is there, and of a run with exactly these settings. Raises RecordError if it is unreadable."""
+    """Say whether the file is there, and of a run with these settings. Raises RecordError if it cannot be read."""
     return path.exists() and config.is_identified_by(read_record(path).digest)
 
 

@@ -1,4 +1,4 @@
-"""Proposing targets in raw units from pilot runs, on other seeds than the experiment's.
+"""Proposals of targets in raw units, from pilot runs, on other seeds than the experiment's.
 
 A rule and no taste: for each user, the policy of greatest utility on the pooled front of all runs of both methods, in
 units of that front's range; then relaxed in all objectives alike, in steps of 2.5 % of the range, until it is reached
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from jmorl.decision.utility import USERS
+from jmorl.experiments.record import RunRecord
 from jmorl.paper.analysis import generations_within, pooled_front
 from jmorl.paper.plan import METHODS, USER_STEPS
-from jmorl.paper.record import RunRecord
 from jmorl.search.bounds import within
 
 RELAXATION = 0.025  # of the range of the pooled front
@@ -44,7 +44,7 @@ class Proposal:
 
 
 def proposals(records: Sequence[RunRecord], steps: int) -> list[Proposal]:
-    """One for each of the paper's users that has a run of either method."""
+    """Return a proposal for each of the paper's users that has runs of both methods."""
     whole = [record for record in records if record.fault is None]
     front = pooled_front(whole, steps)
     by_user = {user: _of(whole, user) for user in USERS}
@@ -52,7 +52,7 @@ def proposals(records: Sequence[RunRecord], steps: int) -> list[Proposal]:
 
 
 def _of(whole: Sequence[RunRecord], user: str) -> Runs:
-    """Equally many runs of each method: those of this user, and of PGMORL, which has no user."""
+    """Return equally many runs of each method: those of this user, and of PGMORL, which has no user."""
     runs = {
         method: [r for r in whole if r.config["method"] == method and (method == "pgmorl" or r.config["user"] == user)]
         for method in METHODS
@@ -84,12 +84,12 @@ def _reaching(records: Sequence[RunRecord], target: np.ndarray, steps: int) -> i
 
 
 def _has(record: RunRecord, target: np.ndarray, generation: int) -> bool:
-    """Whether the archive has a policy as good as the target after a generation."""
+    """Say whether the archive has a policy as good as the target after a generation."""
     return bool(within(record.values[list(record.generations[generation].front)], target).any())
 
 
 def propose(env: str, records: Mapping[str, RunRecord]) -> str:
-    """The proposals for an environment, as text."""
+    """Write the proposals for an environment."""
     whole = [record for record in records.values() if record.fault is None]
     if not whole:
         return f"{env}: no pilot runs yet"

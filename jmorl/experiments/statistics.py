@@ -1,4 +1,4 @@
-"""Few runs, some of which time out: what can be said of them.
+"""Means and intervals of few runs, some of which time out.
 
 Letters: S runs, one a seed.
 """
@@ -15,7 +15,7 @@ FEWEST = 3  # values whose interval says anything
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and its percentile bootstrap interval: with so few values it is rather too narrow."""
+    """A mean and its percentile bootstrap interval, which is rather too narrow for few values."""
 
     mean: float
     low: float
@@ -25,7 +25,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Difference:
-    """The mean of paired differences and its t interval: few values, for which a bootstrap's is too narrow."""
+    """The mean of paired differences and its t interval: for few values a bootstrap's is too narrow."""
 
     mean: float
     low: float
@@ -48,7 +48,7 @@ class Difference:
 
 
 def interval(values: Sequence[float]) -> Interval:
-    """The mean of values [S], S >= 1, with its percentile bootstrap interval; one value, or equal ones, have no width.
+    """Return the mean of values [S], S >= 1, with its percentile bootstrap interval; for equal ones its width is 0.
 
     The percentile method, not BCa: with five values, several of them equal, the latter is often undefined.
     """
@@ -70,7 +70,7 @@ def interval(values: Sequence[float]) -> Interval:
 
 
 def difference(values: Sequence[float]) -> Difference:
-    """The mean of paired differences [S], S >= 1, with its t interval; one value, or equal ones, have no width."""
+    """Return the mean of paired differences [S], S >= 1, with its t interval; for equal ones its width is 0."""
     from scipy.stats import t  # slow to import
 
     sample = np.asarray(values, float)
@@ -109,6 +109,6 @@ class Times:
 
 
 def saved(one: Times, other: Times) -> Difference:
-    """How many steps within the budget `one` needs less than `other`, seed by seed, both in the same order."""
+    """Return the steps within the budget that `one` saves against `other`, both with the same seeds in one order."""
     pairs = zip(one.restricted, other.restricted, strict=True)
     return difference([theirs - ours for ours, theirs in pairs])
