@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from jmorl.state import Prospect
+from jmorl.studio.view import View
 
 LETTERS = "ABC"  # of the places
 
@@ -42,3 +45,13 @@ class Selection:
         left = {letter: there for letter, there in self.places.items() if there != policy}
         focus = next(reversed(left.values()), None) if self.focus == policy else self.focus
         return replace(self, places=left, focus=focus)
+
+
+def wanted(view: View, selection: Selection) -> list[int] | None:
+    """Return the policies with more of what there should be more of, the least change first; None stands for all."""
+    if selection.more_of is None:
+        return None
+    reference = view.policy(selection.than) if selection.than is not None else None
+    least = reference.values[selection.more_of] if reference else -np.inf
+    members = sorted(view.front, key=lambda policy: float(policy.values[selection.more_of]))
+    return [policy.id for policy in members if policy.values[selection.more_of] > least]

@@ -8,9 +8,10 @@ from jmorl.display.text import duration, number_format, plural, short_count, val
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
 from jmorl.state import Prospect
-from jmorl.studio.selection import Selection
+from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import PERSON, View
 
+POLICIES, PROGRESS, HISTORY, NAVIGATION = "Policies", "Progress", "History", "E-NAUTILUS"  # titles of panels
 KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
@@ -140,16 +141,6 @@ def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
         return f"{ruled_out} The model expects nothing new within these bounds."
     best = minus(values_in_words(prospect.expected.max(axis=0), view.objectives, formats))
     return f"{ruled_out} The model expects up to {best}."
-
-
-def wanted(view: View, selection: Selection) -> list[int] | None:
-    """The policies that have more of what there should be more of, the least change first; None for all."""
-    if selection.more_of is None:
-        return None
-    reference = view.policy(selection.than) if selection.than is not None else None
-    least = reference.values[selection.more_of] if reference else -np.inf
-    members = sorted(view.front, key=lambda policy: float(policy.values[selection.more_of]))
-    return [policy.id for policy in members if policy.values[selection.more_of] > least]
 
 
 def minus(text: str) -> str:

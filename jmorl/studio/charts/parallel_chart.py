@@ -8,7 +8,7 @@ import numpy as np
 from jmorl.display.limits import around
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
-from jmorl.studio.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
+from jmorl.studio.charts.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
 from jmorl.studio.selection import Selection
 from jmorl.studio.view import View
 

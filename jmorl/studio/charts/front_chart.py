@@ -10,7 +10,7 @@ from jmorl.display.limits import around, core, inside
 from jmorl.display.text import plural
 from jmorl.search.bounds import within
 from jmorl.state import Prospect
-from jmorl.studio.chart_style import (
+from jmorl.studio.charts.chart_style import (
     BLUE,
     GREEN,
     GREY,
@@ -24,8 +24,7 @@ from jmorl.studio.chart_style import (
     better,
     plain,
 )
-from jmorl.studio.selection import Selection
-from jmorl.studio.texts import wanted
+from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import View
 
 STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"

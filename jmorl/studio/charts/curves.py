@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from jmorl.studio.chart_style import BLUE, GREY, ORANGE, TEXT, base
+from jmorl.studio.charts.chart_style import BLUE, GREY, ORANGE, TEXT, base
 from jmorl.studio.view import View
 
 
