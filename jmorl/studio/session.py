@@ -9,7 +9,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -31,11 +31,14 @@ from jmorl.studio.view import PERSON, View, after, stored_view
 
 
 class Session:
-    """The run that is open, and what is laid out of it."""
+    """The run that is open, and what is laid out of it.
+
+    `background` works out what choosing a policy would mean, one policy after the other; it ends with the session.
+    """
 
     view: View
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, clock: Callable[[], float] = time.monotonic, background: Executor | None = None):
         self.clock = clock
         self.selection = Selection()
         self.dialogue: Dialogue | None = None
@@ -44,7 +47,7 @@ class Session:
         self._moving = threading.Lock()  # while one run is left for another
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
-        self._thinking = ThreadPoolExecutor(1, "prospects")
+        self._background = background or ThreadPoolExecutor(1, "prospects")
 
     def open(self, path: Path) -> None:
         """Show the run in a folder, and go on with it if it has not ended. Raises as `resume` and `read_run` do."""
@@ -60,9 +63,19 @@ class Session:
         timeline = Timeline(folder.config, self.clock())
         self.view = replace(self.view, timeline=timeline, notes=continued.notes, result=None, reason="")
         self.leaving = False
-        self._person = Person(self._asked) if folder.config.user == PERSON else None
+        self._person = Person(self.ask) if folder.config.user == PERSON else None
         self._thread = threading.Thread(target=self._run, args=(continued, self._person), name="run")
         self._thread.start()
+
+    def ask(self, question: Question) -> None:
+        """Open a question of the run, and see what is laid out in its light."""
+        self.view = replace(self.view, question=question, bounds=question.bounds)
+        self._rearrange(lambda selection: replace(selection, prospects={}))
+        for policy in self.selection.letters:
+            if self.view.policy(policy):
+                self._think(question, policy)
+            else:
+                self.put_away(policy)
 
     def answer(self, question: Question, answer: Answer) -> bool:
         """Answer the open question; False if it is no longer open. Raises ValueError if it has no such policy."""
@@ -140,15 +153,20 @@ class Session:
         self.leaving = True
         if self._person:
             self._person.leave()
-        if self._thread:
-            self._thread.join()
-            self._thread = None
+        self.wait()
         self.leaving = False
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the run has ended or was left. Return False if that takes longer than `timeout` seconds."""
+        thread = self._thread
+        if thread:
+            thread.join(timeout)
+        return thread is None or not thread.is_alive()
 
     def close(self) -> None:
         """Leave the run, and do nothing any more."""
         self.leave()
-        self._thinking.shutdown(cancel_futures=True)
+        self._background.shutdown(cancel_futures=True)
 
     @contextmanager
     def _move(self) -> Iterator[None]:
@@ -179,16 +197,6 @@ class Session:
         finally:
             self.view = replace(self.view, timeline=None, question=None)
 
-    def _asked(self, question: Question) -> None:
-        """A question is open: what is laid out is seen in its light."""
-        self.view = replace(self.view, question=question, bounds=question.bounds)
-        self._rearrange(lambda selection: replace(selection, prospects={}))
-        for policy in self.selection.letters:
-            if self.view.policy(policy):
-                self._think(question, policy)
-            else:
-                self.put_away(policy)
-
     def _show(self, path: Path) -> None:
         """Show what the folder has; of a run that has ended, its result is laid out."""
         self.view = stored_view(path)
@@ -200,7 +208,7 @@ class Session:
         """Find out in the background what choosing the policy would mean."""
         state = self.view.state
         if question and question.purpose == "steer" and state and policy not in self.selection.prospects:
-            self._thinking.submit(self._note_prospect, question, state, policy)
+            self._background.submit(self._note_prospect, question, state, policy)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
         try:
