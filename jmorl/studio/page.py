@@ -34,7 +34,7 @@ KINDS: dict[Tone, Literal["warning", "negative"] | None] = {"hint": None, "warni
 
 
 class Page:
-    """One tab on the screen."""
+    """The panels of one browser tab, and the messages over them."""
 
     def __init__(self, session: Session):
         self.tab = tab = Tab(session, self._show, self._tell)

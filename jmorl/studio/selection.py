@@ -1,4 +1,4 @@
-"""What is laid out to be compared: the same in every tab, so that a reload loses nothing."""
+"""The policies that are laid out to be compared: the same in every tab, so that a reload loses nothing."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,22 +13,22 @@ LETTERS = "ABC"  # of the places
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The policies being looked at, the one in focus, and what there should be more of."""
+    """The policies laid out, the one in focus, and the objective that somebody wants more of."""
 
     places: Mapping[str, int] = field(default_factory=dict)  # letter -> policy; the one looked at longest first
     focus: int | None = None  # one of the policies
-    more_of: int | None = None  # index of an objective
-    than: int | None = None  # the policy that the others are to have more than; None: all are shown, in order
+    more_of: int | None = None  # index of the objective asked for; None: all policies are shown
+    than: int | None = None  # the policy that the others are to be better than; None: all are, in order
     prospects: Mapping[int, Prospect] = field(default_factory=dict)  # policy -> what choosing it would mean, if known
 
     @property
     def letters(self) -> dict[int, str]:
-        """The letter of each policy, in the order of the letters."""
+        """Return the letter of each policy, in the order of the letters."""
         return {policy: letter for letter, policy in sorted(self.places.items())}
 
     @property
     def prospect(self) -> Prospect | None:
-        """What choosing the policy in focus would mean, if that is known."""
+        """Return what choosing the policy in focus would mean, if that is known."""
         return None if self.focus is None else self.prospects.get(self.focus)
 
     def with_policy(self, policy: int) -> "Selection":
@@ -48,7 +48,7 @@ class Selection:
 
 
 def wanted(view: View, selection: Selection) -> list[int] | None:
-    """Return the policies with more of what there should be more of, the least change first; None stands for all."""
+    """Return the policies better in the objective asked for, the least change first; None if none is asked for."""
     if selection.more_of is None:
         return None
     reference = view.policy(selection.than) if selection.than is not None else None

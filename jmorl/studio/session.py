@@ -78,16 +78,17 @@ class Session:
                 self.put_away(policy)
 
     def answer(self, question: Question, answer: Answer) -> bool:
-        """Answer the open question; False if it is no longer open. Raises ValueError if it has no such policy."""
+        """Answer the open question. Return False if it is open no more. Raises ValueError if it has no such policy."""
         return self._person is not None and self._person.reply(question, answer)
 
     def look_at(self, policy: int) -> None:
-        """Lay a policy out and put it in focus; nothing if there is none."""
+        """Lay a policy out and put it in focus; do nothing if there is none."""
         if self.view.policy(policy):
             self._rearrange(lambda selection: selection.with_policy(policy))
             self._think(self.view.question, policy)
 
     def put_away(self, policy: int) -> None:
+        """Lay a policy out no longer."""
         self._rearrange(lambda selection: selection.without(policy))
 
     def more_of(self, objective: int | None) -> None:
@@ -97,7 +98,7 @@ class Session:
         self._rearrange(lambda selection: replace(selection, more_of=objective, than=than))
 
     def history(self) -> tuple[Branch, ...]:
-        """The run that is open among its branches."""
+        """Read the run that is open, and its branches."""
         return read_tree(self.view.path)
 
     def step_back(self, run: str, generation: int) -> None:
@@ -128,7 +129,7 @@ class Session:
         self._move_to(dialogues.begin(view.front, view.objectives, generation, iterations, points))
 
     def reply(self, at: Dialogue, answer: PointAnswer) -> bool:
-        """Answer in E-NAUTILUS; False if the dialogue has moved on. Raises ValueError for what is not possible."""
+        """Answer in E-NAUTILUS. Return False if the dialogue has moved on. Raises ValueError for a wrong answer."""
         if at is not self.dialogue:
             return False
         self._move_to(dialogues.reply(at, answer))
@@ -140,10 +141,11 @@ class Session:
             self.dialogue = self.dialogue.before
 
     def close_dialogue(self) -> None:
+        """Leave E-NAUTILUS."""
         self.dialogue = None
 
     def policy_file(self, run: str, policy: int) -> Path | None:
-        """The file of an archived policy of a run in the history."""
+        """Return the file of an archived policy of a run in the history; None if there is none."""
         member = next((each for each in self.history() if each.run == run), None)
         path = member.path / "policies" / f"{policy:05d}.npz" if member else None
         return path if path and path.is_file() else None
@@ -170,7 +172,7 @@ class Session:
 
     @contextmanager
     def _move(self) -> Iterator[None]:
-        """One at a time. Raises ValueError for the second."""
+        """Allow one move from run to run at a time. Raises ValueError for a second one."""
         if not self._moving.acquire(blocking=False):
             raise ValueError("another tab is just leaving this run; nothing has changed")
         try:
@@ -179,7 +181,7 @@ class Session:
             self._moving.release()
 
     def _run(self, continued: Continued, person: Person | None) -> None:
-        """What the thread does."""
+        """Run to the end, or until the run is left, and keep the view up to date; the thread of the run does this."""
         try:
             with continued.folder:
                 for event in continued.events(person):

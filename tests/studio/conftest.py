@@ -44,7 +44,7 @@ def person_config(small_config):
 
 @pytest.fixture
 def make_session():
-    """Sessions that are closed after the test, whatever came of them."""
+    """Make sessions that are closed after the test, whatever came of them."""
     made = []
 
     def make():
@@ -58,7 +58,7 @@ def make_session():
 
 @pytest.fixture
 def session(compiled_once, person_config, make_session, tmp_path):
-    """A new run with a person as its user, in its warm-up."""
+    """Begin a run with a person as its user; it is in its warm-up."""
     session = make_session()
     folder = RunFolder.create(tmp_path / "run", person_config, envs.make(person_config.env))
     session.drive(Continued(folder, None))

@@ -26,7 +26,7 @@ def browser():
 
 @pytest.fixture(scope="module")
 def small(small_config, tmp_path_factory):
-    """The settings of a run of seconds: three generations of an environment that any process knows by its module."""
+    """Return the settings of a short run: three generations of an environment that any process knows by its module."""
     config = tmp_path_factory.mktemp("config") / "config.toml"
     config.write_text(small_config.replace(env=f"tests.registered:{ThreeWays.id}").to_toml())
     return "--config", config

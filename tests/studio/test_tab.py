@@ -28,7 +28,7 @@ def question(session):
 
 @pytest.fixture
 def watching(session, question):
-    """A tab that shows the first question."""
+    """Open a tab that shows the first question."""
     return Watching(session)
 
 

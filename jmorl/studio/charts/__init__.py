@@ -1,1 +1,1 @@
-"""What the charts of the studio draw, as options of Apache ECharts: pure functions of the view and the selection."""
+"""The charts of the studio as options of Apache ECharts: pure functions of the view and the selection."""

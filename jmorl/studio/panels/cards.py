@@ -1,4 +1,4 @@
-"""The policies that are laid out: how they behave, what they score, what choosing them would mean."""
+"""The policies that are laid out: their behaviour, their scores, and what choosing them would mean."""
 
 from nicegui import ui
 from nicegui.element import Element
@@ -16,7 +16,7 @@ class Player(Element, component="player.js"):
 
 
 class Cards:
-    """As many places as there are letters; a policy stays in its place while it is laid out."""
+    """The places of the cards, one for each letter; a policy stays in its place while it is laid out."""
 
     def __init__(self, tab: Tab):
         self.tab = tab
@@ -52,7 +52,7 @@ class Cards:
 
 
 class Card:
-    """One policy."""
+    """The card of one policy."""
 
     def __init__(self, tab: Tab, policy: Policy, letter: str):
         self.tab = tab
@@ -88,7 +88,7 @@ class Card:
         self.choose = ui.button(on_click=lambda: tab.choose(policy.id)).props("no-caps dense").classes("choose")
 
     def show(self) -> None:
-        """What depends on the question, and on the focus."""
+        """Show what depends on the question and on the focus."""
         view, selection = self.tab.view, self.tab.selection
         focused = selection.focus == self.policy.id
         prospect = selection.prospects.get(self.policy.id) if view.question else None

@@ -1,4 +1,4 @@
-"""Charts of Apache ECharts on the page: how options become a picture, and what was clicked in it."""
+"""Charts of Apache ECharts on the page: drawing options, and reading clicks."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The line at the top: which run this is, what goes on in it, how much of its budget is used."""
+"""The line at the top: the run, its phase, and the share of its budget that is used."""
 
 from nicegui import ui
 

@@ -1,4 +1,4 @@
-"""The keyboard: what each key does, and the list of the keys."""
+"""The keyboard: the command of each key, and the list of the keys."""
 
 from nicegui import ui
 from nicegui.events import KeyEventArguments

@@ -1,4 +1,4 @@
-"""What the page asks of every panel, and how a panel finds out whether it must be drawn anew."""
+"""The protocol of a panel, and the memory by which it knows whether to draw anew."""
 
 from typing import Protocol
 

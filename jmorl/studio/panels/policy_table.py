@@ -17,12 +17,12 @@ class Grid(Element, component="policy_table.js"):
 
 
 class PolicyTable:
-    """The front as rows: id, values with their spread, generation."""
+    """The front as rows: id, values with their standard deviations, generation."""
 
     def __init__(self, tab: Tab):
         self.tab = tab
         self.drawn, self.marked = Shown(), Shown()
-        self.by: int | None = None  # what there was more of when last shown
+        self.by: int | None = None  # the objective asked for when the marks were last sent
         self.grid = Grid().classes("table")
         self.grid.props["columns"] = self._columns()
         self.grid.props["rows"] = []
@@ -42,7 +42,7 @@ class PolicyTable:
         self.grid.update()
 
     def _send_marks(self) -> None:
-        """Send which rows are laid out, and which rows have more of what there should be more of."""
+        """Send which policies are laid out, and which are better in the objective asked for."""
         view, selection = self.tab.view, self.tab.selection
         by = None if selection.more_of is None or selection.more_of == self.by else selection.more_of + 1
         self.by = selection.more_of

@@ -1,4 +1,4 @@
-"""How the search is doing, generation by generation."""
+"""The progress of the search, generation by generation."""
 
 from nicegui import ui
 

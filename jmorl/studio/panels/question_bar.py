@@ -10,7 +10,7 @@ from jmorl.studio.tab import Tab
 
 
 class QuestionBar:
-    """What is asked; more of an objective, keep the last choice, stop; at the end, the result."""
+    """The question, with buttons to see more of an objective, keep the last choice, or stop; at the end, the result."""
 
     def __init__(self, tab: Tab):
         self.tab = tab
@@ -84,7 +84,7 @@ class QuestionBar:
         self.tab.go_on_for(int(event.value or 1))
 
     def _candidate(self) -> int | None:
-        """The policy that a stop would end with."""
+        """Return the policy that a stop would end with."""
         previous = self.tab.view.previous
         return self.tab.selection.focus if self.tab.selection.focus is not None else previous.id if previous else None
 
@@ -98,7 +98,7 @@ class QuestionBar:
         self.stopping.open()
 
     def _stop(self) -> None:
-        """Just what was confirmed, wherever the focus is now; the dialog does not outlive its question."""
+        """Give the answer that was confirmed, wherever the focus is now. The dialog does not outlive its question."""
         self.stopping.close()
         if self.question and self.ending:
             self.tab.answer(self.question, self.ending)
