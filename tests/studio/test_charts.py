@@ -30,7 +30,7 @@ def policy(number, values):
 
 @pytest.fixture
 def view():
-    """Four policies, the bounds of a choice, and a question."""
+    """Return a view with four policies, the bounds of a choice, and a question."""
     front = tuple(policy(number, values) for number, values in VALUES.items())
     objectives = (Objective("time", "time", "-steps"), Objective("fuel", "<b>fuel</b>", "-J"))
     bounds = np.array([-82.0, -45.0])
@@ -220,6 +220,19 @@ def test_the_heading_says_what_is_asked(view):
     assert (
         texts.heading(ended, Selection()) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
     )
+
+
+@pytest.mark.parametrize(
+    ("method", "user", "text"),
+    [
+        ("interactive", "terminal", "You are asked when this generation is over."),
+        ("pgmorl", "terminal", "You are asked once, at the end."),
+        ("interactive", "A", "User A decides; you watch."),
+    ],
+)
+def test_between_questions_the_heading_says_who_is_asked_and_when(view, method, user, text):
+    config = resolve(overrides={"method": method, "user": user})
+    assert texts.heading(replace(view, question=None, config=config), Selection()) == text
 
 
 @pytest.mark.parametrize(
