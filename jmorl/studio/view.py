@@ -1,4 +1,4 @@
-"""What there is to see of a run, as one immutable record that is replaced as a whole.
+"""A run as it is shown: one immutable record that is replaced as a whole.
 
 The thread of the run makes it, the page reads it; neither waits for the other.
 """
@@ -28,7 +28,7 @@ PERSON = "terminal"  # the config's user whose questions are put on the page
 
 @dataclass(frozen=True, eq=False)
 class Generation:
-    """What is left to see of a generation that is over."""
+    """The record of a generation that is over."""
 
     number: int  # 0: the warm-up
     front: np.ndarray  # [N, M] values of the archive after it
@@ -60,21 +60,21 @@ class View:
 
     @property
     def values(self) -> np.ndarray:  # [N, M]
-        """The front's objective vectors; N may be zero."""
+        """Return the front's objective vectors; N may be zero."""
         return values_of(self.front) if self.front else np.zeros((0, len(self.objectives)))
 
     def policy(self, policy_id: int) -> Policy | None:
-        """A policy that can be looked at, if it is there."""
+        """Return a policy that can be looked at, if it is there."""
         known = (*self.front, *filter(None, (self.previous, self.result)))
         return next((policy for policy in known if policy.id == policy_id), None)
 
     def choosable(self, policy_id: int) -> bool:
-        """Whether a policy may be the answer to the open question."""
+        """Return whether a policy may be the answer to the open question."""
         return self.question is not None and any(policy.id == policy_id for policy in self.question.front)
 
 
 def stored_view(path: Path) -> View:
-    """What a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
+    """Read the view of a run folder; a run in its warm-up has nothing to show yet. Raises as `read_run` does."""
     manifest, config = read_manifest(path), resolve(file=path / "config.toml")
     objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
     nothing = View(path, manifest["run"], config, objectives, (), (), np.full(len(objectives), -np.inf), None, (), None)
@@ -95,7 +95,7 @@ def stored_view(path: Path) -> View:
 
 
 def after(view: View, event: Event, now: float) -> View:
-    """The view when `event` has just happened; `now` is in seconds of the timeline's clock."""
+    """Return the view when `event` has just happened; `now` is in seconds of the timeline's clock."""
     assert view.timeline is not None
     view = replace(view, timeline=view.timeline.after(event, now))
     match event:
@@ -117,7 +117,7 @@ def after(view: View, event: Event, now: float) -> View:
 
 
 def _generations(stored: StoredRun) -> tuple[Generation, ...]:
-    """The fronts are those of all policies evaluated by then."""
+    """Return the generations of a stored run; the front of each is that of all policies evaluated by then."""
     archive, generations = Archive(), []
     metrics = stored.metrics
     for number in range(len(metrics["generation"])):

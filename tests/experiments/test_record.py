@@ -48,7 +48,7 @@ def test_archive_and_buffer_of_every_generation_are_reconstructed(run):
     expected = [
         (
             tuple(policy.id for policy in event.state.archive.members),
-            tuple(policy.id for policy in event.state.buffer.members),
+            tuple(policy.id for policy in event.state.search.buffer.members),
         )
         for event in generations
     ]
@@ -66,7 +66,7 @@ def test_a_record_says_what_the_run_did(run):
     raw = [policy.values if policy.raw is None else policy.raw for policy in policies]
     np.testing.assert_allclose(record.raw, raw, rtol=1e-6)
     assert [question.generation for question in record.questions] == [1, 2, 3, 4]
-    np.testing.assert_allclose(record.bounds(3), generations[3].state.bounds, rtol=1e-6)
+    np.testing.assert_allclose(record.bounds(3), generations[3].bounds, rtol=1e-6)
     units = generations[-1].state.units
     expected = [None] * 3 if units is None else pytest.approx(units.deviation.tolist(), rel=1e-6)
     assert list(record.generations[-1].sigma) == expected

@@ -22,7 +22,7 @@ def best(question, objective):
 
 
 def answer_all(session, objective=0):
-    """Answer every question until the run ends; the answers."""
+    """Answer every question until the run ends. Return the answers."""
     answers = []
     while True:
         question = session.question()

@@ -1,4 +1,4 @@
-"""The front as points: two of its objectives, what lies within the bounds, what was and what may be."""
+"""The front as points in two of its objectives, with its bounds, earlier fronts, choices and expectations."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from jmorl.display.limits import around, core, inside
 from jmorl.display.text import plural
 from jmorl.methods.base import Prospect
 from jmorl.search.bounds import within
-from jmorl.studio.chart_style import (
+from jmorl.studio.charts.chart_style import (
     BLUE,
     GREEN,
     GREY,
@@ -24,8 +24,7 @@ from jmorl.studio.chart_style import (
     better,
     plain,
 )
-from jmorl.studio.selection import Selection
-from jmorl.studio.texts import wanted
+from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import View
 
 STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"
@@ -36,7 +35,7 @@ MANY = 300  # policies; more are drawn smaller
 
 
 def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
-    """What stays while policies are looked at, with the objectives `axes` to the right and upwards."""
+    """Draw what stays while policies are looked at; `axes` are the objectives to the right and upwards."""
     limits = _limits(view, asked)
     far_out = int((~inside(view.values, limits)).sum()) if view.front else 0
     note = f"{plural(far_out, 'policy')} far out, in the table only" if far_out else ""
@@ -55,7 +54,7 @@ def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None
 
 
 def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
-    """What follows from what is laid out: a chart to put over the other, so that only little is drawn anew."""
+    """Draw what follows from the selection: a chart to put over the other, so that little is drawn anew."""
     limits = _limits(view, asked)
     prospect = selection.prospect if view.question else None  # what is answered brings nothing any more
     bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
@@ -72,7 +71,7 @@ def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: 
 
 
 def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
-    """Where both charts have their axes."""
+    """Return the options that give both charts the same axes."""
     visible = visible and bool(view.front)
     x, y = (
         _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
@@ -82,7 +81,7 @@ def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool)
 
 
 def _limits(view: View, asked: PointQuestion | None) -> np.ndarray:
-    """Of the axes, [2, M]: around front and choices without what is far out, bounds, and what E-NAUTILUS shows."""
+    """Return the limits [2, M] of the axes: around the front (but for what is far out), bounds, choices and points."""
     if not view.front:
         return np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
     seen = np.vstack([view.values, *(values for _, values in view.choices)])
@@ -115,20 +114,20 @@ def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> 
     }
 
 
-def _scatter(name: str, data: list[Any], axes: tuple[int, int], **looks: Any) -> dict[str, Any]:
-    """Points [policy, values..., note]; only those that are not silent answer the mouse."""
+def _scatter(name: str, data: list[Any], axes: tuple[int, int], **style: Any) -> dict[str, Any]:
+    """Return a series of points [policy, values..., note]; only those that are not silent answer the mouse."""
     return {
         "type": "scatter",
         "id": name,
         "name": name,
         "data": data,
         "encode": {"x": axes[0] + 1, "y": axes[1] + 1},
-        **looks,
+        **style,
     }
 
 
 def _members(view: View, axes: tuple[int, int], within_bounds: bool) -> dict[str, Any]:
-    """Members of the front within the bounds, or those outside them; pale if they cannot be chosen."""
+    """Draw the members of the front within the bounds, or those outside them; pale if they cannot be chosen."""
     kept = within(view.values, view.bounds) == within_bounds
     data = [
         [policy.id, *values, "" if within_bounds else "outside the bounds"]
@@ -136,7 +135,7 @@ def _members(view: View, axes: tuple[int, int], within_bounds: bool) -> dict[str
         if shown
     ]
     open_to_choice = within_bounds or view.question is None or view.question.purpose == "steer"
-    look = {"color": BLUE} if within_bounds else {"color": "#ffffff", "borderWidth": 1.5}
+    style = {"color": BLUE} if within_bounds else {"color": "#ffffff", "borderWidth": 1.5}
     border = {"borderColor": "#ffffff"} if within_bounds else {"borderColor": BLUE if open_to_choice else PALE}
     names = ["policy", *(f"{each.label} ({each.unit})" for each in view.objectives), "note"]
     return _scatter(
@@ -146,7 +145,7 @@ def _members(view: View, axes: tuple[int, int], within_bounds: bool) -> dict[str
         dimensions=names,
         tooltip={":formatter": TOOLTIP_TEXT},
         symbolSize=(9 if within_bounds else 7) if len(view.front) <= MANY else 5,
-        itemStyle={**look, **border},
+        itemStyle={**style, **border},
         emphasis={"scale": 1.6},
         z=4 if within_bounds else 3,
     )
@@ -159,7 +158,7 @@ def _ghosts(view: View, axes: tuple[int, int]) -> dict[str, Any]:
 
 
 def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
-    """The choices so far, each with the generation it was made for."""
+    """Draw the choices so far, each with the generation it was made for."""
     data = [
         {"value": [0, *plain(values)[0], ""], "label": {"formatter": _when(view, generation)}}
         for generation, values in view.choices
@@ -177,42 +176,42 @@ def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
 
 
 def _when(view: View, generation: int) -> str:
-    """When a choice was made: before which generation, or after the last one."""
+    """Say when a choice was made: before which generation, or after the last one."""
     return "end" if view.result and view.generations and generation > view.generations[-1].number else str(generation)
 
 
 def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
     data = [[view.result.id, *plain(view.result.values)[0], "the result"]] if view.result else []
-    looks = {"symbol": STAR, "symbolSize": 32, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
-    return _scatter("result", data, axes, silent=True, z=6, **looks)
+    style = {"symbol": STAR, "symbolSize": 32, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
+    return _scatter("result", data, axes, silent=True, z=6, **style)
 
 
 def _area(
-    name: str, bounds: np.ndarray, axes: tuple[int, int], limits: np.ndarray, look: dict[str, Any]
+    name: str, bounds: np.ndarray, axes: tuple[int, int], limits: np.ndarray, style: dict[str, Any]
 ) -> dict[str, Any]:
-    """All that is at least as good as the bounds, as far as the chart reaches; nothing without any."""
+    """Draw the area at least as good as the bounds, as far as the chart reaches; nothing without bounds."""
     corners: list[dict[str, Any]] = []
     low, high = limits[:, list(axes)].tolist()
     if np.isfinite(bounds[list(axes)]).any():
         x, y = np.clip(bounds[list(axes)], low, high).tolist()
         corners = [{"coord": [x, y]}, {"coord": high}]
-    area = {"silent": True, "itemStyle": look, "data": [corners] if corners else []}
+    area = {"silent": True, "itemStyle": style, "data": [corners] if corners else []}
     return {"type": "scatter", "id": name, "name": name, "data": [], "silent": True, "markArea": area}
 
 
 def _expected(prospect: Prospect | None, axes: tuple[int, int]) -> dict[str, Any]:
     expected = prospect.expected if prospect else np.zeros((0, 0))
     data = [[0, *values, ""] for values in plain(expected)] if len(expected) else []
-    looks = {"symbol": "path://M4 0h2v4h4v2h-4v4h-2v-4h-4v-2h4z", "symbolSize": 8, "itemStyle": {"color": GREEN}}
-    return _scatter("expected by the model", data, axes, silent=True, z=2, **looks)
+    style = {"symbol": "path://M4 0h2v4h4v2h-4v4h-2v-4h-4v-2h4z", "symbolSize": 8, "itemStyle": {"color": GREEN}}
+    return _scatter("expected by the model", data, axes, silent=True, z=2, **style)
 
 
 def _wanted(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
-    """Rings around what has more of what there should be more of."""
+    """Draw rings around the policies that are better in the objective asked for."""
     more = set(wanted(view, selection) or ())
     data = [[policy.id, *plain(policy.values)[0], ""] for policy in view.front if policy.id in more]
-    look = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
-    return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=look, z=6)
+    style = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
+    return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=style, z=6)
 
 
 def _laid_out(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
@@ -234,7 +233,7 @@ def _laid_out(view: View, selection: Selection, axes: tuple[int, int]) -> dict[s
 
 
 def _points(asked: PointQuestion | None, axes: tuple[int, int]) -> dict[str, Any]:
-    """The points of E-NAUTILUS, and where one is."""
+    """Draw the points of E-NAUTILUS, and the point where the person stands."""
     data: list[dict[str, Any]] = []
     if asked:
         label = {"formatter": "you", "position": "right"}
@@ -245,5 +244,5 @@ def _points(asked: PointQuestion | None, axes: tuple[int, int]) -> dict[str, Any
         ]
         data = [here, *points]
     text = {"show": True, "position": "inside", "fontSize": 10, "fontWeight": "bold", "color": INK}
-    looks = {"symbol": "diamond", "symbolSize": 24, "itemStyle": {"color": ORANGE, "borderColor": INK}}
-    return _scatter("points of E-NAUTILUS", data, axes, silent=True, label=text, z=8, **looks)
+    style = {"symbol": "diamond", "symbolSize": 24, "itemStyle": {"color": ORANGE, "borderColor": INK}}
+    return _scatter("points of E-NAUTILUS", data, axes, silent=True, label=text, z=8, **style)

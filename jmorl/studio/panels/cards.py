@@ -1,17 +1,14 @@
-"""The policies that are laid out: how they behave, what they score, what choosing them would mean."""
-
-from typing import TYPE_CHECKING
+"""The policies that are laid out: their behaviour, their scores, and what choosing them would mean."""
 
 from nicegui import ui
 from nicegui.element import Element
 
 from jmorl.search.policy import Policy
 from jmorl.studio import texts
-from jmorl.studio.chart_style import decimals
+from jmorl.studio.charts.chart_style import decimals
+from jmorl.studio.panels.panel import Shown
 from jmorl.studio.selection import LETTERS
-
-if TYPE_CHECKING:
-    from jmorl.studio.page import Page
+from jmorl.studio.tab import Tab
 
 
 class Player(Element, component="player.js"):
@@ -19,10 +16,11 @@ class Player(Element, component="player.js"):
 
 
 class Cards:
-    """As many places as there are letters; a policy stays in its place while it is laid out."""
+    """The places of the cards, one for each letter; a policy stays in its place while it is laid out."""
 
-    def __init__(self, page: "Page"):
-        self.page = page
+    def __init__(self, tab: Tab):
+        self.tab = tab
+        self.shown = Shown()
         self.cards: dict[str, Card] = {}
         with ui.element("section").classes("panel behaviour").props('aria-label="Behaviour"'):
             controls = Player()
@@ -32,7 +30,10 @@ class Cards:
                 self.places = {letter: ui.element("article").classes("place") for letter in LETTERS}
 
     def show(self) -> None:
-        view, selection = self.page.view, self.page.selection
+        """Show the policies that are laid out. A card that is shown stays: it plays an episode."""
+        view, selection = self.tab.view, self.tab.selection
+        if not self.shown.is_new(view, selection):
+            return
         for letter, place in self.places.items():
             policy = view.policy(selection.places[letter]) if letter in selection.places else None
             card = self.cards.get(letter)
@@ -41,7 +42,7 @@ class Cards:
                 del self.cards[letter]
             if policy and letter not in self.cards:
                 with place:
-                    self.cards[letter] = Card(self.page, policy, letter)
+                    self.cards[letter] = Card(self.tab, policy, letter)
             if policy:
                 self.cards[letter].show()
             focused = policy is not None and policy.id == selection.focus
@@ -51,13 +52,13 @@ class Cards:
 
 
 class Card:
-    """One policy."""
+    """The card of one policy."""
 
-    def __init__(self, page: "Page", policy: Policy, letter: str):
-        self.page = page
+    def __init__(self, tab: Tab, policy: Policy, letter: str):
+        self.tab = tab
         self.policy = policy
         self.letter = letter
-        view = page.view
+        view = tab.view
         self.run = view.run
         with ui.element("div").classes("card-head"):
             ui.label(letter).classes(f"letter mark-{letter}")
@@ -66,7 +67,7 @@ class Card:
             ui.button(icon="download", on_click=lambda: ui.download(address)).props(
                 f'flat dense round size=xs aria-label="save the file of policy {policy.id}"'
             )
-            ui.button(icon="close", on_click=lambda: page.put_away(policy.id)).props(
+            ui.button(icon="close", on_click=lambda: tab.put_away(policy.id)).props(
                 f'flat dense round size=xs aria-label="put policy {policy.id} away"'
             )
         player = Player()
@@ -84,11 +85,11 @@ class Card:
         if policy.raw is not None:
             ui.label(texts.raw_returns(view, policy)).classes("consequences")
         self.consequences = ui.label().classes("consequences")
-        self.choose = ui.button(on_click=lambda: page.choose(policy.id)).props("no-caps dense").classes("choose")
+        self.choose = ui.button(on_click=lambda: tab.choose(policy.id)).props("no-caps dense").classes("choose")
 
     def show(self) -> None:
-        """What depends on the question, and on the focus."""
-        view, selection = self.page.view, self.page.selection
+        """Show what depends on the question and on the focus."""
+        view, selection = self.tab.view, self.tab.selection
         focused = selection.focus == self.policy.id
         prospect = selection.prospects.get(self.policy.id) if view.question else None
         self.consequences.set_text(texts.consequences(view, prospect, self.policy))

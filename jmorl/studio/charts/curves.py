@@ -1,13 +1,13 @@
-"""How the search is doing, generation by generation."""
+"""The progress of the search as curves over the generations."""
 
 from typing import Any
 
-from jmorl.studio.chart_style import BLUE, GREY, ORANGE, TEXT, base
+from jmorl.studio.charts.chart_style import BLUE, GREY, ORANGE, TEXT, base
 from jmorl.studio.view import View
 
 
 def curve_options(view: View) -> dict[str, Any]:
-    """Hypervolume, and the best utility of a user who has one, over the generations."""
+    """Draw the hypervolume over the generations, and the best utility where the user has one."""
     has_utility = any(generation.utility is not None for generation in view.generations)
     names = ["hypervolume", "best utility"] if has_utility else ["hypervolume"]
     return {

@@ -1,4 +1,4 @@
-"""What the charts of the studio have in common: colours that colour-blind people can tell apart, letters, numbers."""
+"""The common style of the charts: colours that colour-blind people can tell apart, text, tooltips, numbers."""
 
 from typing import Any
 
@@ -31,23 +31,23 @@ LINE_TOOLTIP = """
 
 
 def base() -> dict[str, Any]:
-    """Options that every chart begins with."""
+    """Return the options that every chart begins with."""
     return {"animation": False, "textStyle": TEXT, "tooltip": {"renderMode": "richText", "confine": True}}
 
 
 def better(objective: Objective) -> str:
-    """The title of an axis: quantity, unit and direction."""
+    """Return the title of an axis: quantity, unit and direction."""
     return f"{objective_label(objective)}, more is better →"
 
 
 def decimals(values: np.ndarray) -> list[int | None]:
-    """Digits after the point for each objective of the vectors [N, M]; None: as few significant ones as possible."""
+    """Return the digits after the point for each objective of `values` [N, M]; None: significant digits, as needed."""
     formats = [number_format(column) for column in values.T]
     return [int(fmt[1:-1]) if fmt.endswith("f") else None for fmt in formats]
 
 
 def plain(values: np.ndarray) -> list[Any]:
-    """Numbers for JSON, with seven significant digits; infinity, which it does not have, is left out."""
+    """Return numbers for JSON, with seven significant digits; infinity becomes None, as JSON has none."""
     return [[_number(value) for value in row] for row in np.atleast_2d(values)]
 
 

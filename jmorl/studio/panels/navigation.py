@@ -1,19 +1,15 @@
 """E-NAUTILUS on the page: from the worst corner of the front to one of its policies, choice by choice."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
-from nicegui import run, ui
+from nicegui import ui
 
 from jmorl.decision.enautilus import IntermediatePoint
-from jmorl.decision.protocol import Adjust, Back, Choose, PointAnswer, PointQuestion
+from jmorl.decision.protocol import Adjust, Back, Choose, PointQuestion
 from jmorl.display.text import objective_label, plural
 from jmorl.search.scaling import range_scale
 from jmorl.studio import texts
 from jmorl.studio.dialogue import Dialogue
-
-if TYPE_CHECKING:
-    from jmorl.studio.page import Page
+from jmorl.studio.panels.panel import Shown
+from jmorl.studio.tab import Tab
 
 ITERATIONS, POINTS = 3, 3
 
@@ -21,18 +17,19 @@ ITERATIONS, POINTS = 3, 3
 class NavigationPanel:
     """The dialogue as the session has it, or the way into one."""
 
-    def __init__(self, page: "Page"):
-        self.page = page
-        self.shown: tuple[Dialogue | None, bool] | None = None  # the dialogue, and whether its end can be chosen
+    def __init__(self, tab: Tab):
+        self.tab = tab
+        self.seen, self.shown = Shown(), Shown()
         self.body = ui.element("div").classes("navigation")
 
     def show(self) -> None:
-        dialogue = self.page.dialogue
+        """Show where the dialogue stands; replace nothing that somebody is about to press, or has typed."""
+        view, dialogue = self.tab.view, self.tab.dialogue
+        if not self.seen.is_new(view, dialogue):
+            return
         chosen = dialogue.chosen if dialogue else None
-        choosable = chosen is not None and self.page.view.choosable(chosen.id)
-        if self.shown and self.shown[0] is dialogue and self.shown[1] == choosable:
-            return  # nobody shall lose what they are about to press, or have typed
-        self.shown = dialogue, choosable
+        if not self.shown.is_new(dialogue, chosen is not None and view.choosable(chosen.id)):
+            return
         self.body.clear()
         with self.body:
             if dialogue is None:
@@ -67,13 +64,13 @@ class NavigationPanel:
             points = _number("points in each", state.points)
             change = ui.button("Change", on_click=lambda: self._adjust(dialogue, iterations, points))
             change.props("no-caps dense outline")
-            back = ui.button("Step back", on_click=lambda: self._reply(dialogue, Back(1)))
+            back = ui.button("Step back", on_click=lambda: self.tab.reply(dialogue, Back(1)))
             back.props("no-caps dense outline")
             back.set_enabled(state.choices > 0)
-            ui.button("Close", on_click=self._close).props("no-caps dense flat")
+            ui.button("Close", on_click=self.tab.close_dialogue).props("no-caps dense flat")
 
     def _add_point(self, dialogue: Dialogue, question: PointQuestion, number: int, point: IntermediatePoint) -> None:
-        scale, formats = range_scale(question.state.values), texts.formats_of(self.page.view)
+        scale, formats = range_scale(question.state.values), texts.formats_of(self.tab.view)
         worst, best = scale.apply(point.value), scale.apply(point.best)
         with ui.element("div").classes("point"):
             ui.label(str(number)).classes("point-number")
@@ -88,48 +85,27 @@ class NavigationPanel:
             with ui.element("div").classes("point-side"):
                 ui.label(f"{point.closeness:.0f} % of the way")
                 ui.label(f"{plural(int(point.reachable.sum()), 'policy')} left")
-            choose = ui.button("Prefer", on_click=lambda: self._reply(dialogue, Choose(number - 1)))
+            choose = ui.button("Prefer", on_click=lambda: self.tab.reply(dialogue, Choose(number - 1)))
             choose.props("no-caps dense outline")
 
     def _add_end(self, dialogue: Dialogue) -> None:
         chosen = dialogue.chosen
         assert chosen
-        ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {texts.scores(self.page.view, chosen)}.").classes("ending")
-        if self.page.view.choosable(chosen.id):
+        ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {texts.scores(self.tab.view, chosen)}.").classes("ending")
+        if self.tab.view.choosable(chosen.id):
             ui.label("It is laid out below, where you can choose it.").classes("explanation")
         with ui.element("div").classes("controls"):
-            look = ui.button("Look at it", on_click=lambda: self.page.look_at(chosen.id))
+            look = ui.button("Look at it", on_click=lambda: self.tab.look_at(chosen.id))
             look.props("no-caps dense color=primary")
-            undo = ui.button("Step back", on_click=self._undo).props("no-caps dense outline")
+            undo = ui.button("Step back", on_click=self.tab.undo_reply).props("no-caps dense outline")
             undo.set_enabled(dialogue.before is not None)
-            ui.button("Begin again", on_click=self._close).props("no-caps dense flat")
+            ui.button("Begin again", on_click=self.tab.close_dialogue).props("no-caps dense flat")
 
     async def _begin(self, iterations: ui.number, points: ui.number) -> None:
-        await self._try(self.page.session.begin_dialogue, _whole(iterations), _whole(points))
+        await self.tab.begin_dialogue(_whole(iterations), _whole(points))
 
     async def _adjust(self, dialogue: Dialogue, iterations: ui.number, points: ui.number) -> None:
-        await self._reply(dialogue, Adjust(_whole(iterations), _whole(points)))
-
-    async def _reply(self, dialogue: Dialogue, answer: PointAnswer) -> None:
-        await self._try(self.page.session.reply, dialogue, answer)
-
-    def _undo(self) -> None:
-        self.page.session.undo_reply()
-        self.page.refresh()
-
-    def _close(self) -> None:
-        self.page.session.close_dialogue()
-        self.page.refresh()
-
-    async def _try(self, command: Callable[..., object], *arguments: object) -> None:
-        """Clustering a large front takes a moment, in which the page goes on."""
-        with self.page.root:  # what was pressed may be gone then
-            try:
-                if await run.io_bound(command, *arguments) is False:
-                    ui.notify("The dialogue has moved on in another tab; nothing has changed.", type="warning")
-            except ValueError as error:
-                ui.notify(str(error), type="negative")
-        self.page.refresh()
+        await self.tab.reply(dialogue, Adjust(_whole(iterations), _whole(points)))
 
 
 def _number(label: str, value: int) -> ui.number:

@@ -1,7 +1,6 @@
 """The history on the page: a run, its branches, every choice, and the way back."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from nicegui import ui
 
@@ -9,10 +8,9 @@ from jmorl.decision.records import DecisionRecord
 from jmorl.display.text import plural, values_in_words
 from jmorl.studio import texts
 from jmorl.studio.history import Branch
+from jmorl.studio.panels.panel import Shown
+from jmorl.studio.tab import Tab
 from jmorl.studio.view import View
-
-if TYPE_CHECKING:
-    from jmorl.studio.page import Page
 
 LISTED = 20  # policies that a question showed, at most
 
@@ -20,23 +18,28 @@ LISTED = 20  # policies that a question showed, at most
 class HistoryPanel:
     """A tree: the run that came first, under each run the branches that leave it."""
 
-    def __init__(self, page: "Page"):
-        self.page = page
-        self.shown: tuple[object, ...] = ()
+    def __init__(self, tab: Tab):
+        self.tab = tab
+        self.seen = Shown()
+        self.content: tuple[tuple[Branch, ...], str, str] | None = None  # shown: branches, open run, open question
         self.tree = ui.element("div").classes("history").props('role="tree" aria-label="History"')
 
     def show(self) -> None:
-        shown = self.page.session.history(), self.page.view.run, _open_question(self.page.view)
-        if shown == self.shown:  # nobody shall lose a button that they are about to press
+        """Read the history after a new view; replace the tree only if it has changed: somebody may press a button."""
+        view = self.tab.view
+        if not self.seen.is_new(view):
             return
-        self.shown = shown
+        content = self.tab.session.history(), view.run, _open_question(view)
+        if content == self.content:
+            return
+        self.content = content
         self.tree.clear()
         with self.tree:
-            for branch in shown[0]:
+            for branch in content[0]:
                 self._add_branch(branch)
 
     def _add_branch(self, branch: Branch) -> None:
-        view = self.page.view
+        view = self.tab.view
         is_open = branch.run == view.run
         item = ui.element("div").classes("branch" + (" open" if is_open else "")).props('role="treeitem"')
         with item.style(f"margin-left: {18 * branch.depth}px"):
@@ -44,7 +47,7 @@ class HistoryPanel:
                 ui.label(branch.name).classes("branch-name")
                 ui.label(_state(branch, is_open)).classes("branch-state")
                 if not is_open:
-                    open_it = ui.button("Open", on_click=lambda: self.page.switch(branch.run))
+                    open_it = ui.button("Open", on_click=lambda: self.tab.switch(branch.run))
                     open_it.props("no-caps dense outline size=sm")
             for step in branch.steps:
                 self._add_step(branch, step)
@@ -71,11 +74,11 @@ class HistoryPanel:
 
     def _add_way_back(self, branch: Branch, generation: int) -> None:
         if generation - 1 in branch.checkpoints:
-            back = ui.button("Choose otherwise", on_click=lambda: self.page.step_back(branch.run, generation))
+            back = ui.button("Choose otherwise", on_click=lambda: self.tab.step_back(branch.run, generation))
             back.props("no-caps dense flat size=sm")
 
     def _values(self, values: Sequence[float]) -> str:
-        view = self.page.view
+        view = self.tab.view
         return texts.minus(values_in_words(values, view.objectives, texts.formats_of(view)))
 
 

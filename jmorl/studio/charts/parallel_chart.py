@@ -1,4 +1,4 @@
-"""The front as lines, one for each policy, across an axis for each objective: for any number of them."""
+"""The front as lines across an axis for each objective, a line for each policy."""
 
 import json
 from typing import Any
@@ -8,13 +8,13 @@ import numpy as np
 from jmorl.display.limits import around
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
-from jmorl.studio.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
+from jmorl.studio.charts.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
 from jmorl.studio.selection import Selection
 from jmorl.studio.view import View
 
 
 def parallel_options(view: View) -> dict[str, Any]:
-    """What stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
+    """Draw what stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
     inside = within(view.values, view.bounds)
     return {
         **_frame(view, visible=True),
@@ -27,7 +27,7 @@ def parallel_options(view: View) -> dict[str, Any]:
 
 
 def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
-    """The lines of what is laid out: a chart to put over the other."""
+    """Draw the lines of the policies laid out: a chart to put over the other."""
     lines = [
         {
             "value": [*plain(policy.values)[0], policy.id],
@@ -45,7 +45,7 @@ def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
 
 
 def _frame(view: View, visible: bool) -> dict[str, Any]:
-    """Where both charts have their axes."""
+    """Return the options that give both charts the same axes."""
     shown = np.concatenate([view.values, view.bounds[None]]) if _bounded(view) else view.values
     limits = around(shown) if len(shown) else np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
     visible = visible and bool(view.front)
@@ -79,20 +79,20 @@ def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, An
         if shown
     ]
     opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
-    look = {"color": colour, "width": 1.2, "opacity": opacity}
+    style = {"color": colour, "width": 1.2, "opacity": opacity}
     tooltip = {":formatter": LINE_TOOLTIP % json.dumps([objective_label(each) for each in view.objectives])}
-    return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": look, "tooltip": tooltip, "z": 2}
+    return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": style, "tooltip": tooltip, "z": 2}
 
 
 def _bounds(view: View) -> dict[str, Any]:
     data = [plain(view.bounds)[0]] if _bounded(view) else []
-    look = {"color": INK, "width": 1.5, "type": "dashed", "opacity": 1}
+    style = {"color": INK, "width": 1.5, "type": "dashed", "opacity": 1}
     return {
         "type": "parallel",
         "id": "bounds",
         "name": "bounds",
         "data": data,
-        "lineStyle": look,
+        "lineStyle": style,
         "silent": True,
         "z": 4,
     }
