@@ -6,7 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from jmorl.config import PRESETS, Config, Section
+from jmorl.config import Config
+from jmorl.presets import PRESETS
+from jmorl.settings import Section
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
 FLAG, NEGATIVE_VALUE = re.compile(r"--[^=]+"), re.compile(r"-\.?\d.*")

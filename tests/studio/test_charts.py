@@ -223,16 +223,17 @@ def test_the_heading_says_what_is_asked(view):
 
 
 @pytest.mark.parametrize(
-    ("method", "user", "text"),
+    ("silent", "user", "text"),
     [
-        ("interactive", "terminal", "You are asked when this generation is over."),
-        ("pgmorl", "terminal", "You are asked once, at the end."),
-        ("interactive", "A", "User A decides; you watch."),
+        (1, "terminal", "You are asked when this generation is over."),
+        (3, "terminal", "You are asked again in 3 generations."),
+        (None, "terminal", "You are asked once, at the end."),
+        (1, "A", "User A decides; you watch."),
     ],
 )
-def test_between_questions_the_heading_says_who_is_asked_and_when(view, method, user, text):
-    config = resolve(overrides={"method": method, "user": user})
-    assert texts.heading(replace(view, question=None, config=config), Selection()) == text
+def test_between_questions_the_heading_says_who_is_asked_and_when(view, silent, user, text):
+    config, timeline = resolve(overrides={"user": user}), replace(view.timeline, silent=silent)
+    assert texts.heading(replace(view, question=None, config=config, timeline=timeline), Selection()) == text
 
 
 @pytest.mark.parametrize(
