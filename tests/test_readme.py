@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import jmorl
-from tests.resuming import train
+from tests.resuming import go_on, outcome, train
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -75,3 +75,14 @@ def test_contenders_are_compared_as_the_readme_does(small, tmp_path, capsys):
     assert text == (tmp_path / "runs" / "mine" / "REPORT.md").read_text() + "\n"
     assert "| A | mine |" in text and "saved against pgmorl" in text
     assert len(list(tmp_path.glob("runs/mine/records/*.json"))) == 2 * 3
+
+
+def test_a_search_method_of_ones_own_works_as_it_stands(tmp_path, monkeypatch, small_config):
+    (source,) = blocks("Your own search method")
+    (tmp_path / "my_methods.py").write_text(source, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    config = small_config.replace(method="my_methods:random")
+    whole = train(tmp_path / "whole", config)
+    interrupted = train(tmp_path / "interrupted", config, events=3)
+    go_on(interrupted)
+    assert outcome(interrupted) == outcome(whole)
