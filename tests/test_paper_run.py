@@ -61,7 +61,7 @@ def test_untrained_agents_come_first_and_count(paper_run):
     assert [len(event.offspring) for event in generations] == [8, 4, 4, 4]
     untrained = generations[0].offspring[:4]
     assert {policy.id for policy in untrained} == {0, 1, 2, 3}
-    assert set(untrained) & set(generations[0].state.buffer.members)
+    assert set(untrained) & set(generations[0].state.search.buffer.members)
     assert [event.state.evaluation_steps for event in generations] == [4 * 2 * 10 * done for done in (2, 3, 4, 5)]
     stored = read_run(path)
     assert [policy.id for policy in stored.policies] == list(range(20))
