@@ -117,7 +117,7 @@ class _Run:
         yield RunFinished(state, decided.chosen, "satisfied" if satisfied else "budget")
 
     def warm_up(self) -> GenerationFinished:
-        """Generation 0: P new agents."""
+        """Train and evaluate P new agents: generation 0."""
         objectives = len(self.environment.objectives)
         in_paper_units = self.config.evaluation.units == "paper"
         units = initial_units(objectives) if in_paper_units else None

@@ -20,7 +20,7 @@ class Section(pydantic.BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _split_lists(cls, values: Any) -> Any:
-        """A list may be written as on the command line: `64,64`."""
+        """Split lists that are written as on the command line: `64,64`."""
         if not isinstance(values, Mapping):
             return values
         return {name: _split(cls, name, value) for name, value in values.items()}

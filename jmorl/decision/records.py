@@ -139,17 +139,17 @@ def decision_record(question: Question, answer: Answer) -> DecisionRecord:
 
 
 def point_record(question: PointQuestion, answer: PointAnswer) -> PointRecord:
-    """What the log keeps of a question of E-NAUTILUS and its answer."""
+    """Return what the log keeps of a question of E-NAUTILUS and its answer."""
     return PointRecord(question.generation, question.number, answer, _shown(question.representatives))
 
 
 def to_json(record: Record) -> str:
-    """The record as one line, without a line break."""
+    """Return the record as one line, without a line break."""
     return json.dumps({"format": record.format, **asdict(record)}, allow_nan=False)
 
 
 def from_json(line: str, name: str = "the record") -> Record:
-    """The record of a line. Raises ScriptError saying what is wrong with the record, called `name`."""
+    """Return the record of a line. Raises ScriptError saying what is wrong with the record, called `name`."""
     try:
         fields = json.loads(line)
     except json.JSONDecodeError as error:

@@ -78,7 +78,7 @@ class ScriptedUser(DecisionMaker):
         return Choose(self._find(chosen.policy, chosen.values, question.representatives, question.generation))
 
     def _find(self, policy: int, values: tuple[float, ...], shown: tuple[Policy, ...], generation: int) -> int:
-        """The index of the shown policy with these values; if there are several, rather the one with this id.
+        """Return the index of the shown policy with these values; if there are several, rather the one with this id.
 
         The id alone proves nothing: every run numbers its policies from zero.
         """
@@ -97,7 +97,7 @@ class ScriptedUser(DecisionMaker):
 
 
 def _timeline(records: Iterable[R]) -> dict[tuple[int, int], R]:
-    """The records by generation and number, without those that a later line goes back behind."""
+    """Return the records by generation and number, without those that a later line goes back behind."""
     kept: dict[tuple[int, int], R] = {}
     for record in records:
         place = record.generation, record.number if isinstance(record, PointRecord) else 0

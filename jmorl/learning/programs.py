@@ -114,7 +114,7 @@ def device_count(agents: int, available: int) -> int:
 
 
 def _sharded(function: Callable[..., Any], mesh: Mesh, shared: int = 0) -> Any:
-    """`function` of one agent as one compiled call for N: all arguments but the last, `shared` ones have an N axis."""
+    """Compile `function` of one agent for N: all arguments have an N axis, but for the last `shared` ones."""
 
     def all_agents(*arguments: Any) -> Any:
         own = len(arguments) - shared

@@ -47,7 +47,7 @@ class DecisionLog:
 
 
 def _answers(text: str) -> list[RunRecord]:
-    """The records of whole lines, up to the first that is none."""
+    """Return the records of whole lines, up to the first that is none."""
     answers: list[RunRecord] = []
     for line in text.splitlines(keepends=True):
         record = _answer(line)

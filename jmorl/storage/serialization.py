@@ -148,7 +148,7 @@ def _packed(snapshots: Sequence[Any]) -> dict[str, np.ndarray]:
 
 
 def _unpacked(arrays: Mapping[str, np.ndarray], count: int, train_state: Any) -> list[Any]:
-    """The snapshots, shaped as `train_state`. Each has its own memory, so that none keeps the others alive."""
+    """Return the snapshots, shaped as `train_state`. Each has its own memory, so that none keeps the others alive."""
     leaves, tree = jax.tree.flatten(train_state)
     found: list[list[Any]] = [[None] * len(leaves) for _ in range(count)]
     for kind, indices in _kinds(leaves).items():
