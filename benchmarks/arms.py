@@ -22,7 +22,7 @@ def add_arms(parser: argparse.ArgumentParser, result: Path) -> None:
 
 
 def arms(options: argparse.Namespace, env: str) -> Iterator[Config]:
-    """The config of each run. PGMORL asks nobody before its end, so one run of a seed serves all users."""
+    """Yield the config of each run. PGMORL asks nobody before its end, so one run of a seed serves all users."""
     for seed in options.seeds:
         for method in options.methods:
             for user in options.users[:1] if method == "pgmorl" else options.users:

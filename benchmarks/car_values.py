@@ -53,7 +53,7 @@ CACHE = Path(__file__).parents[1] / ".cache" / "exact_front"
 
 
 def optimal_values(weights: np.ndarray, grid: Grid = FINEST, cache: Path | None = CACHE) -> np.ndarray:
-    """The optimal value of every grid point, for weights [W, 2] on (time, fuel): [W, I, J] in units of utility.
+    """Return the optimal value of every grid point, for weights [W, 2] on (time, fuel): [W, I, J] in units of utility.
 
     Solutions are kept in the folder `cache`; None keeps nothing. Raises ValueError for weights that
     are not [W, 2], negative, or so small on time that the time limit matters.
@@ -70,7 +70,7 @@ def optimal_values(weights: np.ndarray, grid: Grid = FINEST, cache: Path | None 
 
 
 def _stored_value(weight: np.ndarray, grid: Grid, cache: Path | None) -> np.ndarray:  # [I, J]
-    """The value of one weight [2], from the cache if it is there."""
+    """Return the value of one weight [2], from the cache if it is there."""
     if cache is None:
         return _solve(weight, grid, cache)
     file = cache / f"{_cache_key(weight.tobytes(), grid)}.npy"
@@ -85,7 +85,7 @@ def _stored_value(weight: np.ndarray, grid: Grid, cache: Path | None) -> np.ndar
 
 
 def _cache_key(weight: bytes, grid: Grid) -> str:
-    """A name that changes with the weight, the grid, the dynamics and this solver."""
+    """Return a name that changes with the weight, the grid, the dynamics and this solver."""
     return hashlib.sha256(weight + repr(grid).encode() + _sources()).hexdigest()[:32]
 
 
@@ -95,7 +95,7 @@ def _sources() -> bytes:
 
 
 def _solve(weight: np.ndarray, grid: Grid, cache: Path | None) -> np.ndarray:  # [I, J]
-    """Modified policy iteration for one weight [2]. Raises RuntimeError if it does not converge."""
+    """Solve for one weight [2] by modified policy iteration. Raises RuntimeError if it does not converge."""
     value = _first_guess(weight, grid, cache)
     for _ in range(MOST_IMPROVEMENTS):
         improved, forces = _improve(value, weight, grid)
@@ -108,7 +108,7 @@ def _solve(weight: np.ndarray, grid: Grid, cache: Path | None) -> np.ndarray:  #
 
 
 def _first_guess(weight: np.ndarray, grid: Grid, cache: Path | None) -> jax.Array:  # [K]
-    """The solution of the grid half as fine, or on the coarsest the value of never moving."""
+    """Return the solution of the grid half as fine, or on the coarsest the value of never moving."""
     if grid.positions < 2 * FEWEST_POSITIONS - 1:
         return jnp.full(grid.positions * grid.velocities, -ENVIRONMENT.time_limit * weight[0])
     coarse = jnp.asarray(_stored_value(weight, grid.halved, cache).ravel())

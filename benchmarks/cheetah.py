@@ -21,11 +21,12 @@ from benchmarks.arms import add_arms, arms
 from jmorl.config import Config
 from jmorl.decision.utility import USERS
 from jmorl.display.console import PlainConsole
+from jmorl.experiments.cells import Cell, Places, missing
+from jmorl.experiments.record import RunRecord, read_record
+from jmorl.experiments.runner import make
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.paper.analysis import generations_within, greatest_utility
-from jmorl.paper.plan import CHEETAH, ITEMS, USER_STEPS, Cell, Plan
-from jmorl.paper.record import RunRecord, read_record
-from jmorl.paper.runner import Places, make, missing
+from jmorl.paper.plan import CHEETAH, ITEMS, USER_STEPS, Plan
 from jmorl.search.pareto import hypervolume
 
 STEPS_OF_AN_EPISODE = 1000
@@ -59,10 +60,10 @@ def _record(config: Config) -> RunRecord:
     else:
         paper = plan.interactive(item, "raw", config.user, config.seed)
     same = {"steps": paper.config.steps, "checkpoints": paper.config.checkpoints.model_dump()}
-    if config.replace(**same).digest() == paper.config.digest():
+    if config.replace(**same).identity() == paper.config.identity():
         cell, places = paper, PAPER
     else:
-        cell, places = Cell(config.digest(), config), VARIANTS
+        cell, places = Cell(config.identity(), config), VARIANTS
     return make([cell], places, lambda *_: None)[0] if missing([cell], places) else read_record(places.record(cell))
 
 

@@ -34,7 +34,7 @@ class Steps(NamedTuple):
 
 
 def converged(model: mujoco.MjModel) -> mujoco.MjModel:
-    """The same model, with a solver that goes on until it has the answer."""
+    """Return the same model, with a solver that goes on until it has the answer."""
     model.opt.tolerance, model.opt.ls_tolerance, model.opt.iterations = 1e-14, 1e-6, 200
     return model
 
@@ -91,27 +91,27 @@ def _policy(index: int) -> Controller:
 
 
 def _gait(model: mujoco.MjModel, rng: np.random.Generator, index: int) -> tuple[np.ndarray, np.ndarray, Controller]:
-    """A trained policy from a start of the environment, with noise in every other pair of episodes."""
+    """Play a trained policy from a start of the environment, with noise in every other pair of episodes."""
     act, noise = _policy(index), 0.2 * (index // 2 % 2)
     qpos, qvel, _ = _reset(model, rng, index)
     return qpos, qvel, lambda observation: act(observation) + noise * rng.normal(size=model.nu)
 
 
 def _reset(model: mujoco.MjModel, rng: np.random.Generator, _index: int) -> tuple[np.ndarray, np.ndarray, Controller]:
-    """A start of the environment, and random actions."""
+    """Play random actions from a start of the environment."""
     qpos, qvel = rng.uniform(-RESET_NOISE, RESET_NOISE, JOINTS), RESET_NOISE * rng.normal(size=JOINTS)
     return qpos, qvel, _random(model, rng)
 
 
 def _far(model: mujoco.MjModel, rng: np.random.Generator, index: int) -> tuple[np.ndarray, np.ndarray, Controller]:
-    """The same, far from the origin."""
+    """Play the same, far from the origin."""
     qpos, qvel, act = _reset(model, rng, index)
     qpos[0] += FAR
     return qpos, qvel, act
 
 
 def _fall(model: mujoco.MjModel, rng: np.random.Generator, _index: int) -> tuple[np.ndarray, np.ndarray, Controller]:
-    """Dropped from anywhere, at any angle, joints anywhere in their ranges, tumbling."""
+    """Drop it from anywhere, at any angle, joints anywhere in their ranges, tumbling."""
     qpos, qvel = np.zeros(JOINTS), rng.normal(size=JOINTS) * [3, 2, 4, 6, 6, 6, 6, 6, 6]
     qpos[1], qpos[2] = rng.uniform(-0.4, 1.5), rng.uniform(-np.pi, np.pi)
     qpos[3:] = rng.uniform(*model.jnt_range[3:].T)

@@ -178,7 +178,7 @@ def _training(env: str, agents: int, environments: int) -> Callable[[], Any]:
     config = resolve("paper", None, {"env": env}).replace(
         population={"agents": agents}, ppo={"environments": environments}, steps=10**9
     )
-    population = Population(envs.make(config.env), config)
+    population = Population(envs.make(config.env), config.learning)
     population.compile()
     train_states = population.initialize(jax.random.key(0))
     weights = evenly_spaced_weights(2, agents)

@@ -96,7 +96,7 @@ class Still(Session):
         bounds = values[policy] - 100
         expected = values[policy] + np.random.default_rng(policy).normal(size=(40, values.shape[1])) * 50
         prospect = Prospect(bounds, (values >= bounds).all(axis=1), expected)
-        self._rearrange(lambda desk: replace(desk, prospects={**desk.prospects, policy: prospect}))
+        self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: prospect}))
 
     def history(self) -> tuple[()]:
         return ()

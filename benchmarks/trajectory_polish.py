@@ -32,7 +32,7 @@ def polished_return(
     start_position: float,
     weight: np.ndarray,  # [2]
 ) -> np.ndarray:  # [2]
-    """The (time, fuel) of greatest utility among the episode `forces` and those polished from it.
+    """Return the (time, fuel) of greatest utility among the episode `forces` and those polished from it.
 
     Every candidate is played in the environment, in float32, and dropped if it fails to terminate.
     """
@@ -88,7 +88,7 @@ def least_fuel_forces(
 
 
 def played_return(environment: MountainCar, forces: np.ndarray, start_position: float) -> np.ndarray | None:  # [2]
-    """The (time, fuel) of playing `forces` [N] from rest until termination; None if they do not terminate."""
+    """Return the (time, fuel) of playing `forces` [N] from rest until termination; None if they do not terminate."""
     padded = np.zeros(environment.time_limit, np.float32)
     padded[: len(forces)] = forces
     rewards, terminated = _play(environment, padded, np.float32(start_position))

@@ -7,7 +7,7 @@ module that does so. An id may carry options of its environment: `envs.make("mo-
 import importlib
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,9 @@ __all__ = [
 ]
 
 _registry: dict[str, Callable[..., Environment[Any]]] = {}
+_made: dict[
+    Hashable, Environment[Any]
+] = {}  # by factory and options: they hold no state, and programs are kept for each
 
 
 def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
@@ -45,11 +48,11 @@ def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
 
 
 def make(id: str, **options: Any) -> Environment[Any]:
-    """The environment called `id`; `module:id` imports `module`, which registers it, first.
+    """Return the environment called `id`, always the same; `module:id` imports `module`, which registers it, first.
 
-    `id,option=value` is another way to give options, as texts. Raises ValueError, naming what is known, for a module,
-    an id or an option that there is none of, for a value that the environment refuses, for a module or an environment
-    that breaks down, and NotAsDeclared for one that declares what cannot be.
+    `id,option=value` is another way to give options, as texts; options must be hashable. Raises ValueError, naming
+    what is known, for a module, an id or an option that there is none of, for a value that the environment refuses,
+    for a module or an environment that breaks down, and NotAsDeclared for one that declares what cannot be.
     """
     module, name, written = _parts(id)
     if module:
@@ -59,6 +62,13 @@ def make(id: str, **options: Any) -> Environment[Any]:
         raise ValueError(f"unknown environment {name!r}; {known}{_hidden(module)}")
     factory, options = _registry[name], written | options
     _check_options(name, factory, options)
+    key = (factory, *sorted(options.items()))
+    if key not in _made:
+        _made[key] = _new(name, factory, options)
+    return _made[key]
+
+
+def _new(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> Environment[Any]:
     try:
         environment = factory(**options)
     except ValueError:

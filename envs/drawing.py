@@ -90,7 +90,7 @@ class Scene:
     window: Window
 
     def to_json(self) -> dict[str, Any]:
-        """The scene as JSON's types; every shape with its `kind`, its class in lower case."""
+        """Return the scene as JSON's types; every shape with its `kind`, its class in lower case."""
         shapes = [{"kind": type(shape).__name__.lower(), **asdict(shape)} for shape in self.shapes]
         return {"shapes": shapes, "window": asdict(self.window)}
 

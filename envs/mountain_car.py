@@ -55,7 +55,7 @@ class MountainCar(Environment[CarState]):
         return Transition(CarState(position, velocity), reward, terminated)
 
     def scene(self, state: CarState) -> Scene:
-        """The whole valley, the flag, and the car upright on the slope."""
+        """Return the whole valley, the flag, and the car upright on the slope."""
         x = np.linspace(*VALLEY.x, 101)
         hill = tuple(zip(x.tolist(), _height(x).tolist(), strict=True))
         (left, right), bottom = VALLEY.x, VALLEY.z[0]
@@ -73,7 +73,7 @@ class MountainCar(Environment[CarState]):
 
 
 def _height(position: np.ndarray | float) -> np.ndarray:
-    """The valley, as Gymnasium draws it."""
+    """Return the valley, as Gymnasium draws it."""
     return np.asarray(np.sin(3 * np.asarray(position)) * 0.45 + 0.55)
 
 

@@ -36,7 +36,7 @@ def quiet_mujoco() -> Iterator[None]:
 
 
 def load_model(name: str) -> mujoco.MjModel:
-    """The model `envs/assets/NAME.xml`, compiled by MuJoCo."""
+    """Return the model `envs/assets/NAME.xml`, compiled by MuJoCo."""
     import mujoco
 
     text = resources.files("envs").joinpath("assets", f"{name}.xml").read_text(encoding="utf-8")
@@ -45,7 +45,7 @@ def load_model(name: str) -> mujoco.MjModel:
 
 
 def planar_capsules(model: mujoco.MjModel, qpos: np.ndarray) -> list[PlanarCapsule]:
-    """The model's capsules at the joint positions `qpos` [nq], in the order of its file."""
+    """Return the model's capsules at the joint positions `qpos` [nq], in the order of its file."""
     import mujoco
 
     data = mujoco.MjData(model)

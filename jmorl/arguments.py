@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
 from envs.names import did_you_mean, nearest
-from jmorl.config import PRESETS, Config, Section
+from jmorl.config import Config
 from jmorl.display.characters import to_path, unicode_argument
+from jmorl.presets import PRESETS
+from jmorl.settings import Section
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
 FLAG, NEGATIVE_VALUE = re.compile(r"--[^=]+"), re.compile(r"-\.?\d.*")

@@ -42,9 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from envs.drawing import NoDrawing
     from jmorl.decision.records import ScriptError
     from jmorl.evaluation import NotInGymnasium
+    from jmorl.experiments.record import RecordError
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
-    from jmorl.paper.record import RecordError
     from jmorl.playback import PlaybackError
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.lock import FolderInUse

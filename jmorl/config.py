@@ -1,30 +1,30 @@
-"""Every setting of a run: frozen, validated, and the presets.
+"""Every setting of a run: frozen and validated.
 
 A `Config` is made by `resolve`: preset, then config file, then flags, each overriding the one before. All
 problems are reported at once, as a `ConfigError`. The letters P, E, T, K, L, M are those of the README.
 """
 
-import hashlib
-import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar, get_args, get_origin
+from typing import Annotated, Any, Self, TypeVar
 
+import numpy as np
 import pydantic
 import tomli_w
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 import envs
 from envs.names import did_you_mean, nearest
+from jmorl import config_format
 from jmorl.decision.users import parse_user
-
-Count = Annotated[int, Field(ge=1, le=2**31 - 1)]  # compiled programs count in 32 bits
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
+from jmorl.learning.settings import EvaluationConfig, LearningConfig, PPOConfig
+from jmorl.methods import registry
+from jmorl.presets import PRESETS
+from jmorl.search.settings import SearchConfig
+from jmorl.search.weights import evenly_spaced_weights
+from jmorl.settings import Count, Finite, NonNegative, Section
 
 C = TypeVar("C", bound="Section")
 
@@ -37,111 +37,15 @@ class ConfigError(ValueError):
         super().__init__("\n".join(problems))
 
 
-class Section(pydantic.BaseModel):
-    """A group of settings: immutable, hashable, unknown names refused."""
-
-    model_config = pydantic.ConfigDict(frozen=True, extra="forbid", validate_default=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _split_lists(cls, values: Any) -> Any:
-        """A list may be written as on the command line: `64,64`."""
-        if not isinstance(values, Mapping):
-            return values
-        return {name: _split(cls, name, value) for name, value in values.items()}
-
-
-def _split(section: type[Section], name: str, value: Any) -> Any:
-    field = section.model_fields.get(name)
-    if field is None or not isinstance(value, str):
-        return value
-    kinds = (field.annotation, *get_args(field.annotation))
-    return (value.split(",") if value else []) if any(get_origin(kind) is tuple for kind in kinds) else value
-
-
 class PopulationConfig(Section):
     """How many agents are trained, and how long between two questions."""
 
     agents: Count = Field(6, description="P, agents trained side by side")
     warmup_iterations: Count = Field(10, description="K, PPO iterations before the first question")
     iterations: Count = Field(10, description="L, PPO iterations in a generation")
-
-
-class PPOConfig(Section):
-    """Multi-objective PPO: how an agent learns from its rollouts."""
-
-    environments: Count = Field(4, description="E, environments of each agent")
-    rollout_steps: Count = Field(1000, description="T, steps of each environment in an iteration")
-    epochs: Count = Field(10, description="passes over each batch of E*T steps")
-    minibatches: Count = Field(32, description="minibatches in an epoch; divides E*T")
-    learning_rate: Positive = Field(3e-4, description="of Adam, at the start of a run")
-    final_learning_rate: Positive = Field(
-        3e-4, description="of Adam, once the budget is used; linear in between, by generation"
+    weights: tuple[NonNegative, ...] = Field(
+        (), description="weights of the first agents, M numbers for each agent in turn; empty: evenly spread"
     )
-    adam_epsilon: Positive = Field(1e-5, description="of Adam")
-    discount: Annotated[float, Field(gt=0, le=1)] = Field(0.995, description="gamma")
-    gae_lambda: Annotated[float, Field(ge=0, le=1)] = Field(0.95, description="lambda of the advantage estimation")
-    clip: Positive = Field(0.2, description="range of the policy ratio, and of the value change")
-    value_coefficient: NonNegative = Field(0.5, description="weight of the value loss")
-    entropy_coefficient: NonNegative = Field(0.0, description="weight of the entropy bonus")
-    action_bound_coefficient: NonNegative = Field(
-        0.0, description="weight of the penalty on mean actions outside the environment's box"
-    )
-    max_gradient_norm: Positive = Field(0.5, description="one global norm over all parameters")
-    initial_log_std: Finite = Field(0.0, description="log standard deviation of a new agent's actions")
-    noise_correlation: Annotated[float, Field(ge=0, lt=1)] = Field(
-        0.0, description="of the exploration noise of successive actions"
-    )
-    hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1)] = Field(
-        (64, 64), description="hidden layers of actor and critic"
-    )
-    weights_on: Literal["raw", "scaled"] = Field(
-        "raw", description="weights act on the objectives in raw units, or in units of their running deviation"
-    )
-
-    @field_validator("minibatches")
-    @classmethod
-    def _divides_batch(cls, minibatches: int, info: ValidationInfo) -> int:
-        if {"environments", "rollout_steps"} <= info.data.keys():
-            batch = info.data["environments"] * info.data["rollout_steps"]
-            if batch % minibatches:
-                raise ValueError(f"{minibatches} minibatches do not divide a batch of E*T = {batch} steps")
-        return minibatches
-
-
-class EvaluationConfig(Section):
-    """How policies are scored. The defaults give a number the same meaning in every run; the paper's units do not."""
-
-    episodes: Count = Field(64, description="episodes of each evaluation")
-    actions: Literal["deterministic", "sampled"] = Field(
-        "deterministic",
-        description="the mean action from the same starts for every policy, or sampled actions from fresh starts",
-    )
-    units: Literal["raw", "paper"] = Field(
-        "raw", description="mean undiscounted return, or the paper's: discounted, rewards over their running deviation"
-    )
-    scale_discount: Annotated[float, Field(gt=0, le=1)] = Field(
-        0.995, description="paper units: gamma of the sums whose running deviation divides rewards"
-    )
-
-
-class SearchConfig(Section):
-    """Which policy is trained next, and with which weights."""
-
-    delta: NonNegative = Field(0.1, description="slack of the bounds, z - delta sqrt(s |z|)")
-    bounds_scale: Literal["range", "one"] = Field(
-        "range", description="s in the bounds: the archive's range of each objective, or 1 (the paper)"
-    )
-    gain_within: Literal["bounds", "front"] = Field(
-        "bounds", description="interactive: measure gains inside the bounds, or over the whole front (the paper)"
-    )
-    value_scale: Literal["range", "none"] = Field(
-        "range", description="search in values scaled by the archive's range, or in values less the reference point"
-    )
-    sparsity_weight: NonNegative = Field(1.0, description="alpha, cost of a sparse front against its hypervolume")
-    weight_divisions: Count = Field(10, description="steps on each edge of the grid of candidate weights")
-    buffer_bins: Count = Field(100, description="directions of the performance buffer")
-    buffer_size: Count = Field(4, description="policies kept in each direction")
 
 
 class CheckpointConfig(Section):
@@ -154,8 +58,10 @@ class Config(Section):
     """One run."""
 
     env: str = Field("mo-mountaincarcontinuous-v0", description="environment id, `ID,option=value`; see `jmorl envs`")
-    method: Literal["interactive", "pgmorl"] = Field(
-        "interactive", description="ask every generation, or only at the end"
+    method: str = Field(
+        "interactive",
+        description="how policies are searched for: interactive (ask every generation), pgmorl (ask only at the end), "
+        "fixed (each agent keeps its weights), or MODULE:NAME of your own",
     )
     user: str = Field(
         "A",
@@ -177,6 +83,27 @@ class Config(Section):
     def _known_environment(cls, env: str) -> str:
         envs.make(env)
         return env
+
+    @field_validator("method")
+    @classmethod
+    def _known_method(cls, method: str) -> str:
+        registry.check(method)
+        return method
+
+    @field_validator("population")
+    @classmethod
+    def _weights_of_every_agent(cls, population: PopulationConfig, info: ValidationInfo) -> PopulationConfig:
+        if population.weights and "env" in info.data:
+            objectives = len(envs.make(info.data["env"]).objectives)
+            expected = population.agents * objectives
+            if len(population.weights) != expected:
+                raise ValueError(
+                    f"weights has {len(population.weights)} numbers, but {population.agents} agents with {objectives} "
+                    f"objectives need {expected}"
+                )
+            if not np.reshape(population.weights, (-1, objectives)).any(axis=1).all():
+                raise ValueError("weights has an agent with nothing but zeros")
+        return population
 
     @field_validator("user")
     @classmethod
@@ -219,9 +146,27 @@ class Config(Section):
         share = min(iterations_done / self.iteration_budget, 1.0)
         return (1 - share) * self.ppo.learning_rate + share * self.ppo.final_learning_rate
 
-    def digest(self) -> str:
-        """A hash of every setting: equal digests are equal runs."""
-        return hashlib.sha256(json.dumps(self.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()[:16]
+    @property
+    def learning(self) -> LearningConfig:
+        """The settings that the compiled programs depend on."""
+        return LearningConfig(self.population.agents, self.ppo, self.evaluation)
+
+    def first_weights(self) -> np.ndarray:  # [P, M]
+        """Return the weights of the warm-up: those that are given, scaled to a sum of one, or evenly spread ones."""
+        objectives = len(envs.make(self.env).objectives)
+        if not self.population.weights:
+            return evenly_spaced_weights(objectives, self.population.agents)
+        given = np.reshape(self.population.weights, (-1, objectives))
+        return np.asarray(given / given.sum(axis=1, keepdims=True))
+
+    def identity(self) -> str:
+        """Return a short hash of all settings that change results: equal identities are equal runs."""
+        return config_format.identity(self.model_dump(mode="json"))
+
+    def is_identified_by(self, stored: str) -> bool:
+        """Return whether a stored identity, of this format or an earlier one, is that of these settings."""
+        settings = self.model_dump(mode="json")
+        return stored in (config_format.identity(settings), config_format.identity_of_format_1(settings))
 
     def replace(self, **changes: Any) -> Self:
         """A validated copy; sections are given as dicts of what changes in them."""
@@ -229,60 +174,15 @@ class Config(Section):
 
     def to_toml(self) -> str:
         """The config as a file that `resolve` reads back to the same config."""
-        return tomli_w.dumps(self.model_dump(mode="json"))
-
-
-_PAPER_CAR = {
-    "population": {"agents": 6, "warmup_iterations": 10, "iterations": 10},
-    "ppo": {"environments": 4, "rollout_steps": 1000, "discount": 0.995},
-    "steps": 2_500_000,
-    "reference_point": (-999.0, -999.0),
-}
-
-# Chosen by measurement: benchmarks/README.md, "The default preset".
-_TUNED_CAR = {
-    **_PAPER_CAR,
-    "ppo": {
-        "environments": 4,
-        "rollout_steps": 1000,
-        "discount": 0.999,
-        "gae_lambda": 0.98,
-        "learning_rate": 1e-3,
-        "final_learning_rate": 2e-4,
-        "noise_correlation": 0.5,
-        "action_bound_coefficient": 3.0,
-    },
-    "search": {"delta": 0.2},
-}
-
-_PAPER_CHEETAH = {
-    "population": {"agents": 6, "warmup_iterations": 40, "iterations": 40},
-    "ppo": {"environments": 4, "rollout_steps": 400, "discount": 0.99},
-    "evaluation": {"episodes": 16, "scale_discount": 0.99},
-    "steps": 5_000_000,
-    "reference_point": (-100.0, -6000.0),
-}
-
-# As many steps in a batch, from more environments at once, and half as many updates from it. The first question waits
-# until policies run: bounds around a policy that stands still or crawls shut out every gait that costs more.
-_TUNED_CHEETAH = {
-    **_PAPER_CHEETAH,
-    "population": {"agents": 6, "warmup_iterations": 120, "iterations": 40},
-    "ppo": {"environments": 16, "rollout_steps": 100, "minibatches": 16, "discount": 0.99},
-}
-
-# preset -> environment -> what differs from the defaults above
-PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "default": {"mo-halfcheetah-v5": _TUNED_CHEETAH, "mo-mountaincarcontinuous-v0": _TUNED_CAR},
-    "paper": {"mo-halfcheetah-v5": _PAPER_CHEETAH, "mo-mountaincarcontinuous-v0": _PAPER_CAR},
-}
+        return tomli_w.dumps({"format": config_format.FORMAT, **self.model_dump(mode="json")})
 
 
 def resolve(preset: str = "default", file: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
-    """Preset, then config file (TOML), then overrides (nested; strings are parsed), validated.
+    """Return preset, then config file (TOML), then overrides (nested; strings are parsed), validated.
 
-    Raises ConfigError with every problem of all three. An environment without an entry in the preset
-    takes the general defaults.
+    An environment without an entry in the preset takes the general defaults. A file that a run wrote has every setting;
+    one that was added since means what was done before there was such a setting, whatever the preset. Raises
+    ConfigError with every problem of all three.
     """
     problems = []
     if preset not in PRESETS:
@@ -294,9 +194,17 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
             from_file = _with_underscores(tomllib.loads(file.read_text(encoding="utf-8-sig")))
         except (OSError, ValueError) as error:
             problems.append(f"config: cannot read {file}: {error}")
+    written = config_format.format_of(from_file)
+    from_file.pop("format", None)
+    if written is not None and written > config_format.FORMAT:
+        problems.append(
+            f"config: {file} has format {written}; this jmorl knows up to {config_format.FORMAT}: update it"
+        )
     chosen = _merged(from_file, overrides or {})
     env = chosen.get("env", Config.model_fields["env"].default)
     base = PRESETS.get(preset, {}).get(envs.plain_id(env), {}) if isinstance(env, str) else {}
+    if written is not None:
+        base = config_format.before_settings_were_added()
     return _validated(Config, _merged(base, chosen), problems)
 
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, Question
-from jmorl.search.metrics import FrontMetrics, PredictionMetrics, UtilityMetrics
+from jmorl.decision.protocol import AnyQuestion
+from jmorl.search.metrics import FrontMetrics
 from jmorl.search.policy import Policy
 from jmorl.state import RunState
 
@@ -39,16 +39,19 @@ class Resumed:
 
     state: RunState
     steps: int  # environment steps used for learning before
+    bounds: np.ndarray  # [M] in force
+    generations_to_question: int | None  # that end before somebody is asked; None: nobody is, before the end
 
 
 @dataclass(frozen=True)
 class Decided:
     """The decision maker has answered."""
 
-    question: Question
-    answer: Answer
-    chosen: Policy
-    bounds: np.ndarray  # [M] that follow from the choice; from a final one none do, so those in force
+    question: AnyQuestion
+    answer: Any  # as `question.checked` returns it
+    chosen: Policy | None  # what the answer prefers to all others shown; None for an answer that prefers none
+    bounds: np.ndarray  # [M] that follow; from a final choice none do, so those in force
+    generations_to_question: int | None  # that end before the next question; None: there is none before the end
     seconds: float  # how long the run waited for the answer
 
 
@@ -64,8 +67,10 @@ class GenerationFinished:
     steps_per_second: float  # of this generation, selection and evaluation included
     training: Mapping[str, float]  # losses, entropy and KL divergence of the last iteration, means over the agents
     front: FrontMetrics
-    utility: UtilityMetrics
-    prediction: PredictionMetrics
+    utility_max: float | None  # of the archive; None for a decision maker without a utility
+    search: Mapping[str, float | None]  # the method's own metrics
+    bounds: np.ndarray  # [M] in force
+    generations_to_question: int | None  # that end before the next question; None: there is none before the end
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """One run: warm-up, generations, final choice, as a generator of events.
 
 The only place that orders learning, search and decision (the paper's Algorithm 1). Everybody who watches a run,
-the command line, the run folder, a page, reads the same events.
+the command line, the run folder, a page, reads the same events. What is particular to a search is its method's.
 """
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -15,46 +15,20 @@ import numpy as np
 import envs
 from envs.core import Environment
 from jmorl.config import Config
-from jmorl.decision.protocol import DecisionMaker, Purpose, Question
+from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
 from jmorl.decision.users import make_user
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
 from jmorl.learning.moppo import TrainState
 from jmorl.learning.population import Population
+from jmorl.methods import registry
+from jmorl.methods.base import Method, Problem, Tasks
 from jmorl.scoring import Scores, paper_scores, raw_scores
-from jmorl.search.buffer import PerformanceBuffer
-from jmorl.search.metrics import (
-    front_metrics,
-    prediction_metrics,
-    utility_metrics,
-)
+from jmorl.search.metrics import front_metrics
 from jmorl.search.policy import Policy, values_of
-from jmorl.search.prediction import Records
-from jmorl.search.scaling import range_scale
-from jmorl.search.selection import Task, select_tasks
-from jmorl.search.weights import evenly_spaced_weights
-from jmorl.state import (
-    RunState,
-    bounds_after,
-    candidate_weights,
-    candidates,
-    members_within,
-    predictions,
-    reference_point,
-    scale_of_gains,
-)
+from jmorl.search.scaling import REFERENCE_MARGIN, range_scale
+from jmorl.search.weights import simplex_grid
+from jmorl.state import RunState, reference_point
 from jmorl.units import initial_units, measured_in
-
-REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor the middle dominate a gain
-
-
-@dataclass(frozen=True)
-class Lineage:
-    """Where the offspring of a generation come from."""
-
-    parents: Sequence[Policy]  # [P]
-    predicted: np.ndarray  # [P, M] raw units
-    candidates: int  # policies that could have been continued
-    select_seconds: float
 
 
 def run(
@@ -68,16 +42,24 @@ def run(
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
-    A `population` of the same environment and sections of the config, left by another run, need not be compiled anew.
-    Raises TrainingFault in the generation in which a number stops being finite; the events before it stand.
+    A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
+    generation in which a number stops being finite, and AnswerError for an answer that its question does not allow;
+    the events before it stand.
     """
     environment = environment or envs.make(config.env)
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
-    return _Run(config, environment, decision_maker, population or Population(environment, config)).events(state)
+    population = population or Population(environment, config.learning)
+    return _Run(config, environment, decision_maker, population).events(state)
+
+
+def make_method(config: Config, environment: Environment[Any]) -> Method[Any]:
+    """Return the search method of a run with these settings."""
+    objectives = measured_in(config.evaluation.units, environment.objectives)
+    return registry.make(config.method, Problem(objectives, config.first_weights(), config.seed, config.search))
 
 
 def evaluation_keys(config: Config, evaluated: int = 0) -> jax.Array:
-    """The keys [episodes] from which a run evaluates its policies, all agents from the same.
+    """Return the keys [episodes] from which a run evaluates its policies, all agents from the same.
 
     For deterministic actions they are the same for every policy of the run; for sampled ones, which are not to be
     selected for their luck, others in each evaluation: after so many `evaluated` policies.
@@ -89,7 +71,7 @@ def evaluation_keys(config: Config, evaluated: int = 0) -> jax.Array:
 
 
 def _keys(config: Config) -> jax.Array:
-    """For initialisation, training and evaluation, [3]."""
+    """Return those for initialisation, training and evaluation, [3]."""
     return jax.random.split(jax.random.key(config.seed), 3)
 
 
@@ -103,8 +85,8 @@ class _Run:
         self.environment = environment
         self.decision_maker = decision_maker
         self.population = population
-        self.candidate_weights = candidate_weights(config, len(environment.objectives))
-        self.objectives = measured_in(config.evaluation.units, environment.objectives)
+        self.method = make_method(config, environment)
+        self.metric_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
         self.initial_key, self.training_key, _ = _keys(config)
 
     def events(self, state: RunState | None) -> Iterator[Event]:
@@ -114,15 +96,13 @@ class _Run:
             yield finished
             state = finished.state
         else:
-            yield Resumed(state, self._steps(state))
+            bounds, silent = self.method.bounds(state.search), self.method.generations_to_question(state.search)
+            yield Resumed(state, self._steps(state), bounds, silent)
         while self._budget_left(state) and not self._satisfied(state):
-            if self.config.method == "interactive" and not state.silent_generations:
-                decided = self.ask(state, "steer", state.archive.members)
+            while question := self.method.question(state):
+                state, decided = self.ask(state, question)
                 yield decided
-                state = replace(
-                    _asked(state, decided), bounds=decided.bounds, silent_generations=decided.answer.generations
-                )
-                if decided.answer.stop:
+                if decided.chosen and question.stops(decided.answer):
                     yield RunFinished(state, decided.chosen, "stopped")
                     return
             finished = self.generation(state)
@@ -130,22 +110,19 @@ class _Run:
             state = finished.state
         satisfied = self._satisfied(state)
         # What satisfies may lie outside the bounds: the search is not the only one that finds things.
-        front = state.archive.members if satisfied else members_within(state.archive.members, state.bounds)
-        decided = self.ask(state, "final", front)
+        front = state.archive.members if satisfied else self.method.final_front(state)
+        state, decided = self.ask(state, self._final_question(state, front))
         yield decided
-        yield RunFinished(_asked(state, decided), decided.chosen, "satisfied" if satisfied else "budget")
+        assert decided.chosen is not None
+        yield RunFinished(state, decided.chosen, "satisfied" if satisfied else "budget")
 
     def warm_up(self) -> GenerationFinished:
-        """Generation 0: P new agents, with weights evenly spread."""
+        """Train and evaluate P new agents: generation 0."""
         objectives = len(self.environment.objectives)
         in_paper_units = self.config.evaluation.units == "paper"
-        state = RunState(
-            PerformanceBuffer(self.config.search.buffer_bins, self.config.search.buffer_size),
-            Records.empty(objectives),
-            bounds=np.full(objectives, -np.inf),
-            units=initial_units(objectives) if in_paper_units else None,
-        )
-        weights = evenly_spaced_weights(objectives, self.config.population.agents)
+        units = initial_units(objectives) if in_paper_units else None
+        state = RunState(self.method.initial_state(), units=units)
+        weights = self.method.problem.weights
         train_states = self.population.initialize(self.initial_key)
         # The authors score untrained agents, too: they enter archive and buffer, and set the units.
         untrained: tuple[Policy, ...] = ()
@@ -155,35 +132,39 @@ class _Run:
         return replace(finished, offspring=(*untrained, *finished.offspring))
 
     def generation(self, state: RunState) -> GenerationFinished:
-        """Select P tasks, train them, and take their offspring in."""
-        state = replace(state, generation=state.generation + 1, silent_generations=max(state.silent_generations - 1, 0))
+        """Train what the method asks for, and take the offspring in."""
+        state = replace(state, generation=state.generation + 1)
         started = time.perf_counter()
-        continued = candidates(state)
-        tasks, predicted = self._select(state, continued)
-        lineage = Lineage(
-            [continued[task.candidate] for task in tasks],
-            predicted,
-            len(continued),
-            time.perf_counter() - started,
-        )
-        train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in lineage.parents))
-        weights = self.candidate_weights[[task.weight for task in tasks]]
-        return self._trained(state, train_states, weights, self.config.population.iterations, lineage)
+        tasks = self.method.tasks(state)
+        select_seconds = time.perf_counter() - started
+        train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in tasks.parents))
+        iterations = self.config.population.iterations
+        return self._trained(state, train_states, tasks.weights, iterations, tasks, select_seconds)
 
-    def ask(self, state: RunState, purpose: Purpose, front: Sequence[Policy]) -> Decided:
-        """Put a question to the decision maker."""
-        previous = state.choice.id if state.choice else None
-        generation = state.generation + 1
-        question = Question(purpose, generation, self.objectives, tuple(front), state.bounds, previous)
+    def ask(self, state: RunState, question: AnyQuestion) -> tuple[RunState, Decided]:
+        """Put a question to the decision maker. Returns the state with the answer, and the event."""
         started = time.perf_counter()
-        answer = self.decision_maker.answer(question)
+        answer = question.checked(self.decision_maker.respond(question))
         seconds = time.perf_counter() - started
-        chosen = question.policy(answer.policy)
-        bounds = bounds_after(self.config, state, chosen) if purpose == "steer" else state.bounds
-        return Decided(question, answer, chosen, bounds, seconds)
+        chosen = question.chosen(answer)
+        state = replace(
+            state,
+            choice=chosen or state.choice,
+            questions=state.questions + 1,
+            policies_shown=state.policies_shown + len(question.shown),
+        )
+        if question.purpose != "final":
+            state = replace(state, search=self.method.answered(state, question, answer))
+        silent = self.method.generations_to_question(state.search)
+        return state, Decided(question, answer, chosen, self.method.bounds(state.search), silent, seconds)
+
+    def _final_question(self, state: RunState, front: Sequence[Policy]) -> Question:
+        previous = state.choice.id if state.choice else None
+        bounds = self.method.bounds(state.search)
+        return Question("final", state.generation + 1, self.method.problem.objectives, tuple(front), bounds, previous)
 
     def _steps(self, state: RunState) -> int:
-        """Environment steps used for learning so far."""
+        """Return the environment steps used for learning so far."""
         return state.iterations * self.config.steps_per_iteration
 
     def _budget_left(self, state: RunState) -> bool:
@@ -192,38 +173,14 @@ class _Run:
     def _satisfied(self, state: RunState) -> bool:
         return self.decision_maker.satisfied(state.archive.values)
 
-    def _select(self, state: RunState, continued: list[Policy]) -> tuple[list[Task], np.ndarray]:
-        """The tasks whose predicted offspring improve the front most, and the predictions [P, M] in raw units.
-
-        In the interactive search only what lies within the bounds counts as an improvement.
-        """
-        search = self.config.search
-        scale = scale_of_gains(self.config, state)
-        bounded = state.choice is not None and search.gain_within == "bounds"
-        front = members_within(state.archive.members, state.bounds) if bounded else state.archive.members
-        if bounded:
-            reference = scale.apply(state.bounds)
-        elif search.value_scale == "range":
-            reference = np.full_like(state.bounds, -REFERENCE_MARGIN)
-        else:
-            reference = np.zeros_like(state.bounds)  # the scale's origin is the reference point
-        tasks = select_tasks(
-            scale.apply(predictions(self.config, state, continued)),
-            scale.apply(values_of(front)),
-            reference,
-            self.config.population.agents,
-            search.sparsity_weight,
-            np.random.default_rng([self.config.seed, state.generation]),
-        )
-        return tasks, scale.invert(np.stack([task.predicted for task in tasks]))
-
     def _trained(
         self,
         state: RunState,
         train_states: TrainState,
         weights: np.ndarray,
         iterations: int,
-        lineage: Lineage | None = None,
+        tasks: Tasks | None = None,
+        select_seconds: float = 0.0,
     ) -> GenerationFinished:
         """Train agents [P] with weights [P, M], evaluate them, and take them in."""
         started = time.perf_counter()
@@ -232,47 +189,42 @@ class _Run:
             train_states, weights, key, iterations, self.config.learning_rate(state.iterations)
         )
         trained = time.perf_counter()
-        state, offspring = self._evaluated(state, train_states, weights, lineage)
+        state, offspring = self._evaluated(state, train_states, weights, tasks)
         evaluated = time.perf_counter()
         state = replace(state, iterations=state.iterations + iterations)
-        seconds = Seconds(lineage.select_seconds if lineage else 0.0, trained - started, evaluated - trained)
+        seconds = Seconds(select_seconds, trained - started, evaluated - trained)
+        utilities = self.decision_maker.utility(state.archive.values)
         return GenerationFinished(
             state,
             offspring,
-            lineage.candidates if lineage else 0,
+            tasks.candidates if tasks else 0,
             self._steps(state),
             seconds,
             iterations * self.config.steps_per_iteration / seconds.total,
             diagnostics.means(),
-            front_metrics(state.archive.values, reference_point(state), self.candidate_weights),
-            utility_metrics(self.decision_maker.utility, state.archive.members, state.buffer.members, state.bounds),
-            prediction_metrics(lineage.parents if lineage else (), offspring, range_scale(state.archive.values)),
+            front_metrics(state.archive.values, reference_point(state), self.metric_weights),
+            None if utilities is None else float(utilities.max()),
+            self.method.metrics(state, self.decision_maker.utility, offspring, tasks),
+            self.method.bounds(state.search),
+            self.method.generations_to_question(state.search),
         )
 
     def _evaluated(
-        self, state: RunState, train_states: TrainState, weights: np.ndarray, lineage: Lineage | None
+        self, state: RunState, train_states: TrainState, weights: np.ndarray, tasks: Tasks | None
     ) -> tuple[RunState, tuple[Policy, ...]]:
-        """The state with agents [P], trained with weights [P, M], scored and taken in; and their policies."""
+        """Score agents [P], trained with weights [P, M]. Returns the state with them taken in, and their policies."""
         returns = self.population.evaluate(train_states, evaluation_keys(self.config, state.policies))
         scores, units = raw_scores(returns), None
         if state.units:
             discounts = self.config.ppo.discount, self.config.evaluation.scale_discount
             scores, units = paper_scores(returns, state.units, *discounts)
-        offspring = _policies(state, train_states, weights, scores, lineage)
-        state = self._taken_in(state, offspring, lineage)
-        evaluation_steps, policies = state.evaluation_steps + scores.steps, state.policies + len(offspring)
-        return replace(state, units=units, evaluation_steps=evaluation_steps, policies=policies), offspring
-
-    def _taken_in(self, state: RunState, offspring: tuple[Policy, ...], lineage: Lineage | None) -> RunState:
-        """The state with the offspring in archive, buffer and records."""
+        offspring = _policies(state, train_states, weights, scores, tasks)
         state = replace(state, archive=state.archive.offer(offspring))
         if state.reference_point is None:
             state = replace(state, reference_point=self._first_reference_point(offspring))
-        if lineage:
-            weights = np.stack([child.weights for child in offspring])
-            records = state.records.add(values_of(lineage.parents), weights, values_of(offspring))
-            state = replace(state, records=records)
-        return replace(state, buffer=state.buffer.offer(offspring, scale_of_gains(self.config, state)))
+        state = replace(state, search=self.method.taken_in(state, offspring, tasks))
+        evaluation_steps, policies = state.evaluation_steps + scores.steps, state.policies + len(offspring)
+        return replace(state, units=units, evaluation_steps=evaluation_steps, policies=policies), offspring
 
     def _first_reference_point(self, warmed_up: tuple[Policy, ...]) -> np.ndarray:
         if self.config.reference_point:
@@ -281,32 +233,23 @@ class _Run:
 
 
 def _policies(
-    state: RunState, train_states: TrainState, weights: np.ndarray, scores: Scores, lineage: Lineage | None
+    state: RunState, train_states: TrainState, weights: np.ndarray, scores: Scores, tasks: Tasks | None
 ) -> tuple[Policy, ...]:
-    """Learners [P] and their scores as records."""
+    """Return agents [P] and their scores as records."""
+    predicted = None if tasks is None else tasks.predicted
     return tuple(
         Policy(
             id=state.policies + index,
             generation=state.generation,
-            parent=lineage.parents[index].id if lineage else None,
+            parent=tasks.parents[index].id if tasks else None,
             weights=weights[index],
             values=scores.values[index],
             std=scores.std[index],
             discounted=scores.discounted[index],
             # Copied, or each policy would keep those of its whole generation in memory.
             snapshot=jax.tree.map(lambda leaf, index=index: leaf[index].copy(), train_states),
-            predicted=lineage.predicted[index] if lineage else None,
+            predicted=None if predicted is None else predicted[index],
             raw=None if scores.raw is None else scores.raw[index],
         )
         for index in range(len(weights))
-    )
-
-
-def _asked(state: RunState, decided: Decided) -> RunState:
-    """The state with a question counted and its choice noted."""
-    return replace(
-        state,
-        choice=decided.chosen,
-        questions=state.questions + 1,
-        policies_shown=state.policies_shown + len(decided.question.front),
     )

@@ -47,7 +47,7 @@ def in_running_units(
     units: RunningUnits,
     discount: float,
 ) -> tuple[np.ndarray, RunningUnits]:
-    """The episode's rewards [T, M] as the wrappers give them out, and the units after it.
+    """Return the episode's rewards [T, M] as the wrappers give them out, and the units after it.
 
     Step by step `G <- discount G (1 - terminated) + r` enters mean and variance (Welford 1962, Chan et al. 1979), and
     r is divided by the deviation of all G up to this one, and clipped. The merging of single numbers is summed up:
@@ -76,7 +76,7 @@ def _discounted_sums(rewards: np.ndarray, terminated: bool, before: np.ndarray, 
 
 
 def measured_in(units: str, objectives: Sequence[Objective]) -> tuple[Objective, ...]:
-    """The objectives as scores have them: in "paper" units they have lost those of the environment."""
+    """Return the objectives as scores have them: in "paper" units they have lost those of the environment."""
     if units == "raw":
         return tuple(objectives)
     return tuple(replace(objective, unit=DRIFTING) for objective in objectives)

@@ -7,7 +7,7 @@ import pytest
 from jmorl.config import Config
 from jmorl.learning.devices import use_all_cpu_cores
 from tests.registered import ThreeWays
-from tests.resuming import share_compiled_programs, train
+from tests.resuming import train
 
 use_all_cpu_cores()
 jax.config.update("jax_num_cpu_devices", 2)
@@ -32,14 +32,6 @@ def small_config():
 
 
 @pytest.fixture(scope="module")
-def compiled_once():
-    """Runs share their compiled programs while this is in use."""
-    with pytest.MonkeyPatch.context() as patch:
-        share_compiled_programs(patch)
-        yield
-
-
-@pytest.fixture(scope="module")
-def whole(compiled_once, small_config, tmp_path_factory):
+def whole(small_config, tmp_path_factory):
     """The folder of a run that nobody interrupted: warm-up, three generations, four questions."""
     return train(tmp_path_factory.mktemp("runs") / "whole", small_config)

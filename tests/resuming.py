@@ -4,37 +4,15 @@ import csv
 import io
 import itertools
 import json
-import sys
 
 import envs
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.users import make_user
-from jmorl.learning.population import Population
 from jmorl.storage.policy_file import load_policy
 from jmorl.storage.resume import Continued, resume
 from jmorl.storage.run_folder import RunFolder
 
 TIMES = ("steps_per_second", "select_seconds", "train_seconds", "evaluate_seconds", "total_seconds")
-
-
-def share_compiled_programs(patch):
-    """Let all runs of equal shapes use one population; what another process finds is tested elsewhere."""
-    made = {}
-
-    class CompiledOnce(Population):
-        seconds = None
-
-        def compile(self):
-            self.seconds = self.seconds or super().compile()
-            return self.seconds
-
-    def shared(environment, config):
-        key = config.env, config.population, config.ppo, config.evaluation
-        if key not in made:
-            made[key] = CompiledOnce(environment, config)
-        return made[key]
-
-    patch.setattr(sys.modules["jmorl.loop"], "Population", shared)
 
 
 class Counting(DecisionMaker):

@@ -1,48 +1,63 @@
 """Imports go one way, as the README says."""
 
 import ast
-from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
+from tests.imports import import_circle, import_graph, imported_names, modules
+
 ROOT = Path(__file__).parent.parent
+GRAPH = import_graph(ROOT, "envs", "jmorl")
 
 # Part -> what it may import, of the project and of JAX. A part is a package, or a module of `jmorl`.
 MAY_IMPORT = {
     "envs": {"jax"},
-    "jmorl.search": set(),
+    "jmorl.settings": set(),
+    "jmorl.search": {"jmorl.settings"},
     "jmorl.display": {"envs", "jmorl.search"},
     "jmorl.decision": {"envs", "jmorl.display", "jmorl.search"},
-    "jmorl.config": {"envs", "jmorl.decision"},
     "jmorl.module_path": set(),
     "jmorl.signals": set(),
     "jmorl.units": {"envs"},
-    "jmorl.arguments": {"envs", "jmorl.config", "jmorl.display"},
-    "jmorl.learning": {"envs", "jax", "jmorl.config"},
+    "jmorl.learning": {"envs", "jax", "jmorl.settings"},
+    "jmorl.state": {"jmorl.search", "jmorl.units"},
+    "jmorl.methods": {"envs", "jmorl.decision", "jmorl.search", "jmorl.state"},
+    "jmorl.config_format": set(),
+    "jmorl.presets": set(),
+    "jmorl.config": {
+        *("envs", "jmorl.config_format", "jmorl.decision", "jmorl.learning", "jmorl.methods", "jmorl.presets"),
+        *("jmorl.search", "jmorl.settings"),
+    },
+    "jmorl.arguments": {"envs", "jmorl.config", "jmorl.display", "jmorl.presets", "jmorl.settings"},
     "jmorl.scoring": {"jmorl.learning", "jmorl.units"},
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.playback": {"envs", "jax", "jmorl.storage"},
-    "jmorl.state": {"jmorl.config", "jmorl.search", "jmorl.units"},
+    "jmorl.events": {"jmorl.decision", "jmorl.search", "jmorl.state"},
     "jmorl.loop": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),
-        *("jmorl.state", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.methods"),
+        *("jmorl.scoring", "jmorl.search", "jmorl.state", "jmorl.units"),
     },
     "jmorl.storage": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.loop"),
-        *("jmorl.search", "jmorl.state", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.learning"),
+        *("jmorl.loop", "jmorl.methods", "jmorl.search", "jmorl.state", "jmorl.units"),
     },
     "jmorl.report": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.playback"),
-        *("jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.learning"),
+        *("jmorl.playback", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
     },
     "jmorl.studio": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.playback", "jmorl.report"),
-        *("jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage", "jmorl.units"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.playback"),
+        *("jmorl.methods", "jmorl.report", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
+        "jmorl.units",
+    },
+    "jmorl.experiments": {
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.loop", "jmorl.search"),
+        "jmorl.storage",
     },
     "jmorl.paper": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.learning", "jmorl.report", "jmorl.loop"),
-        *("jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
+        *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.experiments"),
+        *("jmorl.report", "jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}
@@ -59,16 +74,11 @@ def part(module):
 
 
 def imports(path):
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        if isinstance(node, ast.ImportFrom) and node.module:
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    return imported_names(path, ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"))
 
 
 def files(name):
-    place = ROOT.joinpath(*name.split("."))
-    return sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
+    return list(modules(ROOT, name).values()) or [ROOT.joinpath(*name.split(".")).with_suffix(".py")]
 
 
 @pytest.mark.parametrize("name", MAY_IMPORT)
@@ -79,12 +89,48 @@ def test_a_part_imports_only_what_it_may(name):
 
 
 def test_no_part_may_import_itself_by_way_of_others():
-    TopologicalSorter(MAY_IMPORT).prepare()  # raises CycleError with the parts of a cycle
+    assert import_circle(MAY_IMPORT) == []
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    """Imports inside functions and those for type checking count, too."""
+    assert import_circle(GRAPH) == []
+
+
+def test_what_learns_knows_neither_the_config_nor_who_decides():
+    reached, new = set(), {module for module in GRAPH if module.startswith("jmorl.learning")}
+    while new:
+        reached |= new
+        new = {imported for module in new for imported in GRAPH[module]} - reached
+    assert not [module for module in reached if module.startswith(("jmorl.config", "jmorl.decision", "jmorl.loop"))]
 
 
 def test_every_part_is_in_the_list():
-    parts = {part(".".join(path.relative_to(ROOT).with_suffix("").parts)) for path in (ROOT / "jmorl").rglob("*.py")}
-    assert parts - {"jmorl.__init__", "jmorl.__main__", "jmorl.cli"} == set(MAY_IMPORT) - {"envs"}
+    parts = {part(module) for module in GRAPH if module.startswith("jmorl.")}
+    assert parts - {"jmorl.__main__", "jmorl.cli"} == set(MAY_IMPORT) - {"envs"}
+
+
+def test_no_package_hides_one_of_its_modules_behind_a_name_that_it_exports():
+    for path in [*files("envs"), *(ROOT / "jmorl").rglob("__init__.py")]:
+        if path.name == "__init__.py":
+            modules = {each.stem for each in path.parent.iterdir()}
+            assert not modules & {name.rpartition(".")[2] for name in imports(path)} - {"__init__"}, path
+
+
+def test_one_place_makes_the_runs_of_comparisons():
+    """Runs made elsewhere are another file beside it: nothing else trains, or opens a run to go on with it."""
+    for name in ("jmorl.experiments", "jmorl.paper"):
+        for path in files(name):
+            trains = any(module.startswith(("jmorl.learning.", "jmorl.storage.resume.")) for module in imports(path))
+            assert trains == (path == ROOT / "jmorl" / "experiments" / "runner.py"), path
+
+
+def test_comparisons_are_of_any_methods():
+    """Nothing in them depends on which method a run has."""
+    for path in files("jmorl.experiments"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            compared = [node.left, *node.comparators] if isinstance(node, ast.Compare) else []
+            assert not any(isinstance(each, ast.Attribute) and each.attr == "method" for each in compared), path
 
 
 def test_only_the_programs_compile_training():

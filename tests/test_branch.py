@@ -92,7 +92,7 @@ def test_a_checkpoint_that_does_not_fit_its_environment_is_not_branched_off(whol
             return jnp.append(state, 0.0)
 
     monkeypatch.setattr(envs, "_registry", {ThreeWays.id: Wider})
-    with pytest.raises(CannotContinue, match="00001 does not fit this jmorl: it has train_states of another shape"):
+    with pytest.raises(CannotContinue, match="00001 does not fit this jmorl: it has train states of another shape"):
         branch(whole, 1, tmp_path / "new")
     assert not (tmp_path / "new").exists()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from jmorl.config import Config, ConfigError, Section, resolve
+from jmorl.config_format import WITHOUT_EFFECT
 
 
 def fields(section, prefix=""):
@@ -28,6 +29,7 @@ OTHER = {
     "population.agents": 4,
     "population.warmup_iterations": 5,
     "population.iterations": 5,
+    "population.weights": (1.0, 0.0, 3.0, 1.0, 0.5, 0.5, 0.0, 1.0, 1.0, 2.0, 1.0, 1.0),
     "ppo.environments": 8,
     "ppo.rollout_steps": 2000,
     "ppo.epochs": 5,
@@ -75,9 +77,9 @@ def test_every_setting_has_another_value_here():
 
 
 @pytest.mark.parametrize("name", OTHER)
-def test_every_setting_changes_the_digest_and_survives_the_file(name, tmp_path):
+def test_every_setting_that_changes_results_changes_the_identity_and_survives_the_file(name, tmp_path):
     changed = resolve().replace(**nested(name, OTHER[name]))
-    assert changed.digest() != resolve().digest()
+    assert (changed.identity() == resolve().identity()) == (name in WITHOUT_EFFECT)
     file = tmp_path / "config.toml"
     file.write_text(changed.to_toml())
     assert resolve(file=file) == changed
@@ -189,10 +191,8 @@ def test_a_config_cannot_be_changed_in_place():
         ({"ppo": {"epoch": 4}}, "ppo.epoch: there is no such setting; did you mean 'ppo.epochs'?"),
         ({"usr": "A"}, "usr: there is no such setting; did you mean 'user'?"),
         ({"xyz": 1}, "xyz: there is no such setting"),
-        (
-            {"method": "interactve"},
-            "method: must be 'interactive' or 'pgmorl', not 'interactve'; did you mean",
-        ),
+        ({"method": "interactve"}, "; did you mean 'interactive'?"),
+        ({"evaluation": {"units": "papr"}}, "must be 'raw' or 'paper', not 'papr'; did you mean 'paper'?"),
         ({"env": "mo-mountaincar-v0"}, "; did you mean 'mo-mountaincarcontinuous-v0'?"),
         ({"user": "weight=1,2"}, "terminal, script=FILE; did you mean 'weights'?"),
         ({"user": "b"}, "script=FILE; did you mean 'B'?"),

@@ -14,9 +14,10 @@ import jax
 import numpy as np
 import pytest
 
+import envs
 from jmorl.cli import main
 from jmorl.events import GenerationFinished
-from jmorl.loop import run
+from jmorl.loop import make_method, run
 from jmorl.storage.checkpoints import CheckpointWriter, read_checkpoint, stored_generations
 from jmorl.storage.resume import resume
 from tests.resuming import go_on, outcome, train
@@ -81,7 +82,7 @@ def killed(process):
 
 
 @pytest.mark.parametrize("kill", range(KILLS))
-def test_a_run_killed_at_any_moment_ends_the_same(whole, start, compiled_once, config_file, tmp_path, kill):
+def test_a_run_killed_at_any_moment_ends_the_same(whole, start, config_file, tmp_path, kill):
     """Every other one at a random file operation, every other one at a random time; every third one twice."""
     uninterrupted, operations, seconds = whole
     generator = np.random.default_rng(kill)
@@ -188,7 +189,7 @@ def test_a_second_signal_ends_the_process_at_once(start, config_file, tmp_path):
         assert stored_generations(again.path / "checkpoints") == [0]
 
 
-def test_six_generations_are_three_and_three_more(small_config, compiled_once, tmp_path):
+def test_six_generations_are_three_and_three_more(small_config, tmp_path):
     longer = small_config.replace(steps=4 * 3 * 16 * 20)
     six = train(tmp_path / "six", longer)
     three = train(tmp_path / "three", longer, events=1 + 1 + 2 * 3)
@@ -197,10 +198,10 @@ def test_six_generations_are_three_and_three_more(small_config, compiled_once, t
     assert outcome(three) == outcome(six)
 
 
-def test_memory_is_flat_over_fifty_generations(small_config, compiled_once, tmp_path):
+def test_memory_is_flat_over_fifty_generations(small_config, tmp_path):
     """But for the policies that the archive keeps, once in the run and once in the checkpoint that is written."""
     config = small_config.replace(steps=4 * 3 * 16 * 3 * 60, method="pgmorl", search={"buffer_bins": 6})
-    writer = CheckpointWriter(tmp_path, "run", keep=2)
+    writer = CheckpointWriter(tmp_path, "run", 2, make_method(config, envs.make(config.env)))
     used = []
     for event in itertools.islice(run(config), 62):
         if isinstance(event, GenerationFinished):

@@ -91,7 +91,7 @@ def test_a_full_disk_ends_the_run_with_what_it_had_and_it_can_go_on(whole, small
 
 
 @pytest.fixture
-def unprivileged(compiled_once, whole):
+def unprivileged(whole):
     """A folder of a user whom permissions bind, as whom the test runs. For root they do not."""
     folder = Path(tempfile.mkdtemp())
     root = os.geteuid() == 0

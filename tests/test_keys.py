@@ -8,6 +8,7 @@ import pytest
 
 from jmorl.learning.moppo import MOPPO
 from jmorl.loop import evaluation_keys, run
+from tests.probes import ThreeWays
 
 DRAWS = ("normal", "uniform", "bits")
 DERIVATIONS = ("split", "fold_in")
@@ -35,7 +36,7 @@ def recorded(patch, config):
     starts = key_words(evaluation_keys(config))
     for name in used:
         patch.setattr(jax.random, name, recording(name, getattr(jax.random, name)))
-    for _ in run(config):
+    for _ in run(config, environment=ThreeWays()):  # an instance of its own is compiled anew, with the recording
         pass
     jax.effects_barrier()
     drawn = sum((used[name] for name in DRAWS), Counter())

@@ -24,7 +24,7 @@ def paper_config(small_config):
 
 
 @pytest.fixture(scope="module")
-def paper_run(compiled_once, paper_config, tmp_path_factory):
+def paper_run(paper_config, tmp_path_factory):
     """The folder of an uninterrupted run and its generations."""
     path = tmp_path_factory.mktemp("runs") / "paper"
     continued = Continued(RunFolder.create(path, paper_config, envs.make(paper_config.env)), None)
@@ -42,7 +42,7 @@ def test_a_run_in_paper_units_resumes_bit_for_bit(paper_run, paper_config, tmp_p
 
 def test_the_scores_are_those_of_one_scorer_fed_in_order(paper_run, paper_config):
     """Untrained agents first, then one generation after the other, from the policies' own train states."""
-    population = Population(envs.make(paper_config.env), paper_config)
+    population = Population(envs.make(paper_config.env), paper_config.learning)
     units = initial_units(3)
     policies = [policy for event in paper_run[1] for policy in event.offspring]
     for first in range(0, len(policies), 4):
@@ -61,7 +61,7 @@ def test_untrained_agents_come_first_and_count(paper_run):
     assert [len(event.offspring) for event in generations] == [8, 4, 4, 4]
     untrained = generations[0].offspring[:4]
     assert {policy.id for policy in untrained} == {0, 1, 2, 3}
-    assert set(untrained) & set(generations[0].state.buffer.members)
+    assert set(untrained) & set(generations[0].state.search.buffer.members)
     assert [event.state.evaluation_steps for event in generations] == [4 * 2 * 10 * done for done in (2, 3, 4, 5)]
     stored = read_run(path)
     assert [policy.id for policy in stored.policies] == list(range(20))
@@ -96,7 +96,7 @@ def test_in_raw_units_there_is_neither(whole):
     assert all(policy.raw is None for policy in stored.policies)
 
 
-def test_actions_and_units_are_separate_choices(compiled_once, small_config, tmp_path):
+def test_actions_and_units_are_separate_choices(small_config, tmp_path):
     """Deterministic in paper units, and sampled in raw ones."""
     one = train(tmp_path / "one", small_config.replace(evaluation={"units": "paper"}))
     other = train(tmp_path / "other", small_config.replace(evaluation={"actions": "sampled"}))

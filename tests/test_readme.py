@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import jmorl
-from tests.resuming import train
+from tests.resuming import go_on, outcome, train
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -27,7 +27,7 @@ def blocks(heading):
 
 
 @pytest.fixture
-def small(compiled_once, tmp_path, monkeypatch):
+def small(tmp_path, monkeypatch):
     """An empty folder to be in, where `jmorl.resolve` gives small sizes; those settings."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("jmorl.use_all_cpu_cores", lambda: None)  # the suite has done so
@@ -63,3 +63,26 @@ def test_what_is_done_from_python_works_line_by_line(small, tmp_path, capsys):
     exec(navigated, names)
     assert "NavigationFinished\n" in capsys.readouterr().out
     assert names["event"].chosen in names["front"]
+
+
+def test_contenders_are_compared_as_the_readme_does(small, tmp_path, capsys):
+    (comparison,) = blocks("The paper's experiments")
+    imported = re.findall(r"^(?:from|import) (\S+)", comparison, re.MULTILINE)
+    assert imported == ["pathlib", "jmorl"]  # nothing deeper
+    exec(comparison, {})
+    assert small[-1].steps == 5_000_000
+    text = capsys.readouterr().out
+    assert text == (tmp_path / "runs" / "mine" / "REPORT.md").read_text() + "\n"
+    assert "| A | mine |" in text and "saved against pgmorl" in text
+    assert len(list(tmp_path.glob("runs/mine/records/*.json"))) == 2 * 3
+
+
+def test_a_search_method_of_ones_own_works_as_it_stands(tmp_path, monkeypatch, small_config):
+    (source,) = blocks("Your own search method")
+    (tmp_path / "my_methods.py").write_text(source, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    config = small_config.replace(method="my_methods:random")
+    whole = train(tmp_path / "whole", config)
+    interrupted = train(tmp_path / "interrupted", config, events=3)
+    go_on(interrupted)
+    assert outcome(interrupted) == outcome(whole)

@@ -1,6 +1,5 @@
 """A run from warm-up to final choice: its order, its accounts, its bounds, for every method, with three objectives."""
 
-import dataclasses
 import hashlib
 import os
 import subprocess
@@ -83,8 +82,8 @@ def test_bounds_follow_the_choice(interactive, small_config):
     for before, decided, after in zip(events[1:-3:2], events[2:-2:2], events[3:-1:2], strict=True):
         unit = np.ptp(before.state.archive.values, axis=0)
         expected = lower_bounds(decided.chosen.values, small_config.search.delta, unit)
-        np.testing.assert_array_equal(after.state.bounds, expected)
-        assert (after.state.bounds <= decided.chosen.values).all()
+        np.testing.assert_array_equal(after.bounds, expected)
+        assert (after.bounds <= decided.chosen.values).all()
 
 
 def test_parents_are_the_choice_or_lie_within_the_bounds(interactive):
@@ -93,7 +92,7 @@ def test_parents_are_the_choice_or_lie_within_the_bounds(interactive):
     for event in generations(events)[1:]:
         for child in event.offspring:
             parent = known[child.parent]
-            assert parent is event.state.choice or (parent.values >= event.state.bounds).all()
+            assert parent is event.state.choice or (parent.values >= event.bounds).all()
             assert child.predicted is not None
 
 
@@ -113,13 +112,13 @@ def test_the_final_question_shows_the_archive_within_the_bounds(interactive):
     user, events = interactive
     final, state = user.questions[-1], events[-1].state
     assert final.purpose == "final"
-    inside = [p for p in state.archive.members if within(p.values[None], state.bounds)[0]]
+    inside = [p for p in state.archive.members if within(p.values[None], state.search.bounds)[0]]
     assert list(final.front) == inside
     assert events[-1].chosen in inside
 
 
 def test_records_are_true_parent_to_child_edges(interactive):
-    records = interactive[1][-1].state.records
+    records = interactive[1][-1].state.search.records
     children = [policy for event in generations(interactive[1])[1:] for policy in event.offspring]
     known = {policy.id: policy for event in generations(interactive[1]) for policy in event.offspring}
     np.testing.assert_array_equal(records.children, values_of(children))
@@ -137,7 +136,7 @@ def test_pgmorl_asks_only_at_the_end_and_has_no_bounds(small_config):
     user = Recorder()
     events = list(run(small_config.replace(method="pgmorl"), user))
     assert [question.purpose for question in user.questions] == ["final"]
-    assert all((event.state.bounds == -np.inf).all() for event in generations(events))
+    assert all((event.bounds == -np.inf).all() for event in generations(events))
     assert user.questions[0].front == events[-1].state.archive.members
 
 
@@ -265,9 +264,9 @@ def test_the_default_reference_point_is_below_the_warm_up(interactive):
 def test_metrics_agree_with_the_state(interactive, small_config):
     last = generations(interactive[1])[-1]
     assert last.front.front_size == len(last.state.archive.members)
-    assert last.utility.utility_max is None  # this user has no utility function
+    assert last.utility_max is None  # this user has no utility function
     with_utility = generations(list(run(small_config)))[-1]
     utilities = with_utility.state.archive.values @ [0.5, 0.3, 0.2]
-    assert with_utility.utility.utility_max == pytest.approx(utilities.max())
-    assert with_utility.utility.utility_mean <= with_utility.utility.utility_max + 1e-12
-    assert dataclasses.asdict(with_utility.prediction)["prediction_error"] >= 0
+    assert with_utility.utility_max == pytest.approx(utilities.max())
+    assert with_utility.search["utility_mean"] <= with_utility.utility_max + 1e-12
+    assert with_utility.search["prediction_error"] >= 0

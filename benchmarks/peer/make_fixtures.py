@@ -71,7 +71,7 @@ def initial_parameters(rng: np.random.Generator) -> Arrays:
 
 
 def forward(parameters: Tensors, network: str, x: torch.Tensor) -> torch.Tensor:
-    """The MLP `network` of x [B, O]: [B, outputs]."""
+    """Return the MLP `network` of x [B, O]: [B, outputs]."""
     for layer in range(3):
         x = x @ parameters[f"{network}/{layer}/kernel"] + parameters[f"{network}/{layer}/bias"]
         x = torch.tanh(x) if layer < 2 else x
@@ -79,12 +79,12 @@ def forward(parameters: Tensors, network: str, x: torch.Tensor) -> torch.Tensor:
 
 
 def policy(parameters: Tensors, observations: torch.Tensor) -> Independent:
-    """The distribution of the actions of each observation."""
+    """Return the distribution of the actions of each observation."""
     return Independent(Normal(forward(parameters, "actor", observations), parameters["log_std"].exp()), 1)
 
 
 def initial_batch(parameters: Arrays, rng: np.random.Generator) -> Arrays:
-    """A batch whose old log-probabilities and values are far enough from the present ones to be clipped often."""
+    """Return a batch whose old log-probabilities and values are far enough from the present ones to be clipped."""
     tensors = as_tensors(parameters)
     observations = short(rng.normal(size=(B, O)))
     distribution = policy(tensors, torch.tensor(observations))
@@ -136,7 +136,7 @@ def losses(parameters: Tensors, batch: Tensors) -> Tensors:
 
 
 def updated(parameters: Arrays, batch: Arrays, steps: int) -> Arrays:
-    """The parameters after `steps` clipped Adam steps, all on the whole batch."""
+    """Return the parameters after `steps` clipped Adam steps, all on the whole batch."""
     leaves = {name: tensor.requires_grad_() for name, tensor in as_tensors(parameters).items()}
     tensors = as_tensors(batch)
     optimizer = torch.optim.Adam(list(leaves.values()), lr=LEARNING_RATE, eps=ADAM_EPSILON)
@@ -183,7 +183,7 @@ def clipped_shares(quantities: Tensors, batch: Tensors) -> dict[str, float]:
 
 
 def updated_by_morl_baselines(parameters: Arrays, batch: Arrays, steps: int) -> Arrays:
-    """What `updated` says, computed by morl-baselines: one minibatch, an epoch a step."""
+    """Compute what `updated` says by morl-baselines: one minibatch, an epoch a step."""
     networks = MOPPONet((O,), (A,), M, [HIDDEN, HIDDEN]).double()
     linears = {
         f"{name}/{layer}": linear
@@ -226,7 +226,7 @@ def updated_by_morl_baselines(parameters: Arrays, batch: Arrays, steps: int) -> 
 
 
 def changes(parameters: Arrays, batch: Arrays, steps: int) -> Arrays:
-    """Updated minus initial parameters, float32, once both implementations agree on them."""
+    """Return updated minus initial parameters, float32, once both implementations agree on them."""
     ours, theirs = updated(parameters, batch, steps), updated_by_morl_baselines(parameters, batch, steps)
     for name, parameter in ours.items():
         np.testing.assert_allclose(parameter, theirs[name], rtol=0, atol=1e-12, err_msg=name)
@@ -257,7 +257,7 @@ def update_fixture(rng: np.random.Generator) -> Arrays:
 
 
 def settings_fixture() -> Arrays:
-    """The settings of the update."""
+    """Return the settings of the update."""
     settings = {
         "clip": CLIP,
         "value_coefficient": VALUE_COEFFICIENT,
@@ -312,7 +312,7 @@ def advantages_as_sums(
 
 
 def prefixed(prefix: str, arrays: Arrays) -> Arrays:
-    """The same arrays under `prefix/name`."""
+    """Return the same arrays under `prefix/name`."""
     return {f"{prefix}/{name}": array for name, array in arrays.items()}
 
 

@@ -35,7 +35,7 @@ class Limits(NamedTuple):
 
 
 def contacts(model: PlanarModel, moving: Kinematics) -> Contacts:
-    """The contacts of a state."""
+    """Return the contacts of a state."""
     radius = constant(model.contact_distance, moving.end)
     x, end_z = moving.end
     depth = radius + model.ground - moving.height - moving.hinge[1] - end_z  # positive in the ground
@@ -55,7 +55,7 @@ def contacts(model: PlanarModel, moving: Kinematics) -> Contacts:
 
 
 def limits(model: PlanarModel, qpos: jax.Array, qvel: jax.Array) -> Limits:
-    """The joint limits of a state [V, batch]; slides have none."""
+    """Return the joint limits of a state [V, batch]; slides have none."""
     angle, velocity = qpos[2:], qvel[2:]
     low, high = (constant(bound, qpos) for bound in model.hinge_range)
     past_low, past_high = low - angle, angle - high
@@ -87,7 +87,7 @@ def limit_residuals(stops: Limits, qacc: jax.Array) -> jax.Array:  # [V, batch] 
 
 
 def contact_stiffness(touching: Contacts, active: jax.Array) -> jax.Array:
-    """What the active rows [3, 2 ends, slots, batch] add to each slot's articulated inertia [9, slots, batch].
+    """Return what the active rows [3, 2 ends, slots, batch] add to each slot's articulated inertia [9, slots, batch].
 
     A row's `J' D J` is stiffness in the plane at the contact point, told about the hinge as a symmetric 3x3; its
     `J' D aref` is a force.

@@ -98,7 +98,7 @@ class _Slot(NamedTuple):
 
 
 def compile_model(model: mujoco.MjModel) -> PlanarModel:
-    """The planar view of a MuJoCo model. Raises UnsupportedModel, naming everything it cannot represent."""
+    """Return the planar view of a MuJoCo model. Raises UnsupportedModel, naming everything it cannot represent."""
     problems = unsupported(model)
     if problems:
         raise UnsupportedModel(problems)
@@ -116,7 +116,7 @@ def compile_model(model: mujoco.MjModel) -> PlanarModel:
 
 
 def _joints(model: mujoco.MjModel, hinges: list[int]) -> dict[str, Any]:
-    """The fields about joints, which are as many as degrees of freedom and share their numbers."""
+    """Return the fields about joints, which are as many as degrees of freedom and share their numbers."""
     dofs = np.array([0, 1, *hinges])
     body = model.jnt_bodyid[hinges]
     sign = model.jnt_axis[hinges, 1]
@@ -137,7 +137,7 @@ def _joints(model: mujoco.MjModel, hinges: list[int]) -> dict[str, Any]:
 
 
 def _slots(model: mujoco.MjModel, slots: list[_Slot]) -> dict[str, Any]:
-    """The fields about slots."""
+    """Return the fields about slots."""
     floor = _floor(model)
     bodies = [slot.body for slot in slots]
     capsules = [floor if slot.capsule is None else slot.capsule for slot in slots]
@@ -157,7 +157,7 @@ def _slots(model: mujoco.MjModel, slots: list[_Slot]) -> dict[str, Any]:
 
 
 def _actuators(model: mujoco.MjModel, bodies: list[int]) -> dict[str, Any]:
-    """The fields about actuators."""
+    """Return the fields about actuators."""
     gear = np.zeros((model.nv, model.nu))
     joints = model.actuator_trnid[:, 0]
     gear[joints, np.arange(model.nu)] = model.actuator_gear[:, 0] * model.actuator_gainprm[:, 0]
@@ -169,7 +169,7 @@ def _actuators(model: mujoco.MjModel, bodies: list[int]) -> dict[str, Any]:
 
 
 def _levels(model: mujoco.MjModel) -> tuple[list[int], tuple[Level, ...]]:
-    """The bodies in level order, and the levels."""
+    """Return the bodies in level order, and the levels."""
     rows: list[list[int]] = [[1]]
     while below := [
         body for parent in rows[-1] for body in range(2, model.nbody) if model.body_parentid[body] == parent
@@ -197,7 +197,7 @@ def _levels(model: mujoco.MjModel) -> tuple[list[int], tuple[Level, ...]]:
 
 
 def _hinge(model: mujoco.MjModel, body: int) -> int:
-    """The joint by which a body turns: its last."""
+    """Return the joint by which a body turns: its last."""
     return int(model.body_jntadr[body] + model.body_jntnum[body] - 1)
 
 
@@ -219,7 +219,7 @@ def _plane(vector: np.ndarray) -> np.ndarray:
 
 
 def _angle(quaternion: np.ndarray) -> float:
-    """The angle about +y of a rotation about y."""
+    """Return the angle about +y of a rotation about y."""
     return 2 * float(np.arctan2(quaternion[2], quaternion[0]))
 
 
@@ -229,7 +229,7 @@ def _turned(angle: float, vector: np.ndarray) -> np.ndarray:
 
 
 def _anchor(model: mujoco.MjModel, body: int) -> np.ndarray:
-    """The anchor of a body's hinge in the frame of its parent's hinge."""
+    """Return the anchor of a body's hinge in the frame of its parent's hinge."""
     own = _turned(_angle(model.body_quat[body]), _plane(model.jnt_pos[_hinge(model, body)]))
     return _plane(model.body_pos[body]) + own - _plane(model.jnt_pos[_hinge(model, int(model.body_parentid[body]))])
 

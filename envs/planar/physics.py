@@ -73,7 +73,7 @@ class PlanarPhysics:
 
 
 def _in_blocks(function: Callable[[jax.Array], jax.Array], state: jax.Array) -> jax.Array:
-    """`function` of [3, V, batch], on a CPU in blocks of equal size that stay in its caches."""
+    """Return `function` of [3, V, batch], on a CPU in blocks of equal size that stay in its caches."""
     batch = state.shape[-1]
     count = math.ceil(batch / BLOCK)
     if count == 1 or jax.default_backend() != "cpu":

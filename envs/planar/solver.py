@@ -77,7 +77,7 @@ def accelerations(
 
 
 def _bodies(slots: jax.Array, level: Level) -> jax.Array:
-    """A level's bodies' sums of all slots' values."""
+    """Return a level's bodies' sums of all slots' values."""
     return total(slots[..., level.slots, :], level.slot_body, level.count)
 
 
@@ -93,7 +93,7 @@ class _Hinge(NamedTuple):
 
 
 def _eliminated(model: PlanarModel, level: Level, whole: jax.Array, joints: Joints) -> _Hinge:
-    """The hinges of a level, of bodies [9, n, batch] about them: to turn is the first component."""
+    """Return the hinges of a level, of bodies [9, n, batch] about them: to turn is the first component."""
     ww, wu, wv, uu, uv, vv, moment, force_x, force_z = whole
     drive = constant(model.hinge_sign[level.bodies], whole) * joints.force[level.dofs]
     own = joints.inertia[level.dofs]
@@ -116,7 +116,7 @@ def _about_parent(bodies: jax.Array, offset: jax.Array) -> jax.Array:
 
 
 def _root_motion(model: PlanarModel, whole: jax.Array, joints: Joints) -> jax.Array:
-    """The root's (w, u, v) [3, 1, batch] from what it resists and feels [9, 1, batch]: a 3x3 solve, v first."""
+    """Return the root's (w, u, v) [3, 1, batch] from what it resists and feels [9, 1, batch]: a 3x3 solve, v first."""
     ww, wu, wv, uu, uv, vv, moment, force_x, force_z = whole
     uu, vv, ww = uu + joints.inertia[0:1], vv + joints.inertia[1:2], ww + joints.inertia[2:3]
     force_x, force_z = force_x + joints.force[0:1], force_z + joints.force[1:2]

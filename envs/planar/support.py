@@ -75,7 +75,7 @@ def prevailing(model: mujoco.MjModel, values: np.ndarray, one: int, other: int) 
 
 
 def capsule_axis(model: mujoco.MjModel, geom: int) -> np.ndarray:  # [3]
-    """The direction of a capsule in the frame of its body."""
+    """Return the direction of a capsule in the frame of its body."""
     direction = np.zeros(3)
     mujoco.mju_rotVecQuat(direction, np.array([0.0, 0.0, 1.0]), model.geom_quat[geom])
     return direction
@@ -127,7 +127,7 @@ def _bodies(model: mujoco.MjModel) -> Iterator[str]:
 
 
 def _joints(model: mujoco.MjModel, body: int) -> Iterator[str]:
-    """The root has a slide along x, one along z and a hinge about y; another body has just such a hinge."""
+    """Name what is missing: the root has slides along x and z and a hinge about y, another body just such a hinge."""
     slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
     wanted = [(slide, (1, 0, 0)), (slide, (0, 0, 1))] if body == 1 else []
     joints = range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])

@@ -10,7 +10,7 @@ from envs.planar.model import PlanarModel
 
 
 def pick(values: jax.Array, index: np.ndarray) -> jax.Array:  # [..., n, batch] -> [..., len(index), batch]
-    """The entries `index`. What comes from a single entry is left at length 1, to be broadcast."""
+    """Return the entries `index`. What comes from a single entry is left at length 1, to be broadcast."""
     first = int(index[0])
     if (index == first).all():
         return values[..., first : first + 1, :]
@@ -20,7 +20,10 @@ def pick(values: jax.Array, index: np.ndarray) -> jax.Array:  # [..., n, batch] 
 
 
 def total(values: jax.Array, index: np.ndarray, size: int) -> jax.Array:  # [..., n, batch] -> [..., size, batch]
-    """Sums of the entries that share an `index`, in order. Written out, as reductions of a few terms are slow."""
+    """Return sums of the entries that share an `index`, in order.
+
+    Written out, as reductions of a few terms are slow.
+    """
     if len(index) == size and (index == np.arange(size)).all():
         return values
     sums = [sum(values[..., int(i), :] for i in np.flatnonzero(index == bin)) for bin in range(size)]
@@ -28,7 +31,7 @@ def total(values: jax.Array, index: np.ndarray, size: int) -> jax.Array:  # [...
 
 
 def at_slots(model: PlanarModel, levels: Sequence[jax.Array]) -> jax.Array:  # [..., slots, batch]
-    """What each level's bodies have, [..., bodies, batch], at all slots."""
+    """Return what each level's bodies have, [..., bodies, batch], at all slots."""
     slots = []
     for values, level in zip(levels, model.levels, strict=True):
         picked = pick(values, level.slot_body)

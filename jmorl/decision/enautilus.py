@@ -51,7 +51,7 @@ class IntermediatePoint:
 
 
 def begin(values: np.ndarray, iterations: int, points: int) -> State:
-    """The start, at the nadir, with all members [N, M] reachable. Members should not dominate each other.
+    """Return the start, at the nadir, with all members [N, M] reachable. Members should not dominate each other.
 
     Raises ValueError unless there is a member, all values are finite, and both numbers are at least 1.
     """
@@ -65,7 +65,7 @@ def begin(values: np.ndarray, iterations: int, points: int) -> State:
 
 
 def intermediate_points(state: State) -> tuple[IntermediatePoint, ...]:
-    """The points of the next iteration, at most n, the best in the first objective first.
+    """Return the points of the next iteration, at most n, the best in the first objective first.
 
     z_i = ((h - 1) z + rep_i) / h, where rep_i stands for a cluster of the reachable members. Raises ValueError if
     no iterations are left.
@@ -83,7 +83,7 @@ def choose(state: State, point: IntermediatePoint) -> State:
 
 
 def step_back(state: State, steps: int) -> State:
-    """The state before the last `steps` choices, exactly as it was. Raises ValueError if there were fewer."""
+    """Return the state before the last `steps` choices, exactly as it was. Raises ValueError if there were fewer."""
     if not 1 <= steps <= state.choices:
         raise ValueError(f"cannot take back {steps} choices: {state.choices} have been made")
     earlier = state
@@ -94,7 +94,10 @@ def step_back(state: State, steps: int) -> State:
 
 
 def adjust(state: State, iterations_left: int, points: int) -> State:
-    """The same place with another h and n. No iterations left ends the dialogue here; at least 1 point is shown."""
+    """Return the same place with another h and n.
+
+    No iterations left ends the dialogue here; at least 1 point is shown.
+    """
     if iterations_left < 0 or points < 1:
         raise ValueError(f"cannot go on for {iterations_left} iterations with {points} points in each")
     return replace(state, iterations_left=iterations_left, points=points)
@@ -107,7 +110,7 @@ def finished(state: State) -> bool:
 
 
 def result(state: State) -> int:
-    """The index of the member that the dialogue ends on: of those reachable, the nearest to the last point.
+    """Return the index of the member that the dialogue ends on: of those reachable, the nearest to the last point.
 
     Nearest by an augmented achievement scalarising function (Wierzbicki 1980): the member whose worst objective,
     relative to the point and in units of the front's range, is best. Ties go to the first.
@@ -118,7 +121,7 @@ def result(state: State) -> int:
 
 
 def _towards(state: State, member: int) -> IntermediatePoint:
-    """The point that is one iteration nearer to a reachable member."""
+    """Return the point that is one iteration nearer to a reachable member."""
     target, h = state.values[member], state.iterations_left
     # Rounding must not put the point beyond its own representative, nor below the point before.
     value = np.clip(((h - 1) * state.point + target) / h, state.point, target)
@@ -146,7 +149,7 @@ def _representatives(state: State) -> list[int]:
 
 
 def _clusters(vectors: np.ndarray, most: int) -> list[list[int]]:
-    """The distinct vectors [N, M] in at most so many clusters: average linkage (Euclidean), cut by count."""
+    """Return the distinct vectors [N, M] in at most so many clusters: average linkage (Euclidean), cut by count."""
     if len(vectors) <= most:
         return [[index] for index in range(len(vectors))]
     from scipy.cluster.hierarchy import linkage  # slow to import, and fronts are often small
@@ -162,7 +165,7 @@ def _clusters(vectors: np.ndarray, most: int) -> list[list[int]]:
 
 
 def _nearest_to_centroid(vectors: np.ndarray, cluster: list[int]) -> int:
-    """The member of a cluster nearest its centroid; of equally near ones the best in the first objective."""
+    """Return the member of a cluster nearest its centroid; of equally near ones the best in the first objective."""
     candidates = np.array(sorted(cluster, reverse=True))
     distances = np.linalg.norm(vectors[candidates] - vectors[candidates].mean(axis=0), axis=1)
     return int(candidates[np.argmax(distances <= distances.min() + TIE)])

@@ -60,14 +60,14 @@ def run_enautilus(
     points: int,
     generation: int,
 ) -> Policy:
-    """The policy that `navigate` ends on."""
+    """Return the policy that `navigate` ends on."""
     *_, last = navigate(front, objectives, choose_point, iterations, points, generation)
     assert isinstance(last, NavigationFinished)
     return last.chosen
 
 
 def respond(question: PointQuestion, answer: PointAnswer) -> State:
-    """The state that an answer leads to. Raises ValueError if the question does not allow it."""
+    """Return the state that an answer leads to. Raises ValueError if the question does not allow it."""
     match answer:
         case Choose(point):
             if not 0 <= point < len(question.points):

@@ -4,8 +4,10 @@ The run imports this; users implement it; neither knows the other.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from operator import index
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,50 +15,218 @@ from envs.core import Objective
 from jmorl.decision.enautilus import IntermediatePoint, State
 from jmorl.search.policy import Policy, values_of
 
-Purpose = Literal["steer", "final", "enautilus"]
+Purpose = Literal["steer", "final", "enautilus", "pair"]
+
+
+class AnswerError(ValueError):
+    """An answer that its question does not allow. The message says what was wrong, and what it should be."""
+
+
+class AnyQuestion(ABC):
+    """Something that a decision maker can be asked. A method may bring kinds of its own.
+
+    A kind says how it is put to a decision maker, what a valid answer is, and how an answer is written down.
+    """
+
+    purpose: str  # names the kind in the decision log
+    generation: int  # the one about to start; at the end, the one after the last
+    objectives: tuple[Objective, ...]
+
+    @property
+    @abstractmethod
+    def shown(self) -> tuple[Policy, ...]:
+        """The policies that are shown."""
+
+    @property
+    def values(self) -> np.ndarray:  # [N, M]
+        """The objective vectors of the policies that are shown."""
+        return values_of(self.shown)
+
+    @abstractmethod
+    def put_to(self, user: "DecisionMaker") -> Any:
+        """Return the user's answer, by whichever of their abilities answers this kind."""
+
+    @abstractmethod
+    def checked(self, answer: Any) -> Any:
+        """Return the answer in its proper types. Raise AnswerError if it is none to this question."""
+
+    @abstractmethod
+    def to_json(self, answer: Any) -> dict[str, Any]:
+        """Return a checked answer as JSON can hold it."""
+
+    def from_json(self, fields: dict[str, Any]) -> Any:
+        """Return the answer that `to_json` wrote. Raise AnswerError if it is none to this question."""
+        raise AnswerError(f"answers to a question of kind {self.purpose!r} cannot be read back")
+
+    def chosen(self, answer: Any) -> Policy | None:
+        """Return the policy that a checked answer prefers to all others shown; None if it prefers none."""
+        return None
+
+    def stops(self, answer: Any) -> bool:
+        """Return whether a checked answer ends the run with the policy it chose."""
+        return False
 
 
 @dataclass(frozen=True)
-class Question:
+class Question(AnyQuestion):
     """Which of these policies do you prefer?
 
     `purpose` is "steer" at the start of a generation and "final" at the end of a run, when the
     answer is the run's result. `front` has at least one member; at the end of an interactive run
     it holds those within the bounds. "enautilus": which of the policies that the points of E-NAUTILUS
-    head for; see `DecisionMaker.choose_point`.
+    head for, see `DecisionMaker.choose_point`; "pair": which of two, see `DecisionMaker.compare`.
     """
 
     purpose: Purpose
-    generation: int  # the one about to start; at the end, the one after the last
+    generation: int
     objectives: tuple[Objective, ...]
     front: tuple[Policy, ...]
     bounds: np.ndarray  # [M] those in force; -inf before the first choice
     previous: int | None  # id of the policy chosen last
 
     @property
-    def values(self) -> np.ndarray:  # [N, M]
-        """The objective vectors of the front."""
-        return values_of(self.front)
+    def shown(self) -> tuple[Policy, ...]:
+        """The front."""
+        return self.front
 
     def policy(self, policy_id: int) -> Policy:
-        """The member of the front with this id. Raises ValueError if there is none."""
+        """Return the member of the front with this id. Raise ValueError if there is none."""
         for policy in self.front:
             if policy.id == policy_id:
                 return policy
         raise ValueError(f"policy {policy_id} is not among the policies shown: {[policy.id for policy in self.front]}")
 
+    def put_to(self, user: "DecisionMaker") -> Any:
+        """Return `user.answer(self)`."""
+        return user.answer(self)
+
+    def checked(self, answer: Any) -> "Answer":
+        """Return the answer if it is an `Answer` with a policy of the front. Raise AnswerError."""
+        if not isinstance(answer, Answer):
+            raise AnswerError(f"answer must return a jmorl.Answer(policy id), not {_shortly(answer)}")
+        try:
+            self.policy(answer.policy)
+        except ValueError as error:
+            raise AnswerError(str(error)) from None
+        return answer
+
+    def to_json(self, answer: Any) -> dict[str, Any]:
+        """Return the fields of the answer."""
+        return asdict(answer)
+
+    def from_json(self, fields: dict[str, Any]) -> Any:
+        """Return the answer with these fields."""
+        return self.checked(Answer(**fields))
+
+    def chosen(self, answer: Any) -> Policy:
+        """Return the policy of the answer."""
+        return self.policy(answer.policy)
+
+    def stops(self, answer: Any) -> bool:
+        """Return whether the run shall end here."""
+        return bool(answer.stop)
+
 
 @dataclass(frozen=True)
 class Answer:
-    """The preferred policy, by id, and what the run shall do next."""
+    """The preferred policy, by id, and what the run shall do next.
+
+    NumPy's and other whole numbers become Python's, and a `Policy` its id. Raises AnswerError for anything else.
+    """
 
     policy: int
     stop: bool = False  # end the run here, with this policy
-    generations: int = 1  # how many generations to go on before the next question
+    generations: int = 1  # how many generations to go on before the next question, at least 1
+
+    def __post_init__(self) -> None:
+        policy = self.policy.id if isinstance(self.policy, Policy) else _whole("policy", self.policy, 0)
+        object.__setattr__(self, "policy", policy)
+        object.__setattr__(self, "generations", _whole("generations", self.generations, 1))
+        if not isinstance(self.stop, (bool, np.bool_)):
+            raise AnswerError(f"stop must be True or False, not {_shortly(self.stop)}")
+        object.__setattr__(self, "stop", bool(self.stop))
 
 
 @dataclass(frozen=True)
-class PointQuestion:
+class PairQuestion(AnyQuestion):
+    """Which of two policies do you prefer?"""
+
+    generation: int
+    objectives: tuple[Objective, ...]
+    pair: tuple[Policy, Policy]
+    purpose: str = "pair"
+
+    @property
+    def shown(self) -> tuple[Policy, ...]:
+        """Both."""
+        return self.pair
+
+    def put_to(self, user: "DecisionMaker") -> Any:
+        """Return `user.compare(self)`."""
+        return user.compare(self)
+
+    def checked(self, answer: Any) -> int | None:
+        """Return the id of the preferred policy, or None for no difference. Raise AnswerError."""
+        if answer is None:
+            return None
+        ids = [policy.id for policy in self.pair]
+        preferred = answer.id if isinstance(answer, Policy) else _whole("the preferred policy", answer, 0)
+        if preferred not in ids:
+            raise AnswerError(f"policy {preferred} is neither of the two shown: {ids}")
+        return preferred
+
+    def to_json(self, answer: Any) -> dict[str, Any]:
+        """Return which is preferred."""
+        return {"preferred": answer}
+
+    def from_json(self, fields: dict[str, Any]) -> int | None:
+        """Return which is preferred."""
+        return self.checked(fields.get("preferred"))
+
+
+@dataclass(frozen=True)
+class WeightQuestion(AnyQuestion):
+    """How much does each objective matter to you, compared with the others?"""
+
+    generation: int
+    objectives: tuple[Objective, ...]
+    front: tuple[Policy, ...]  # for orientation
+    purpose: str = "weights"
+
+    @property
+    def shown(self) -> tuple[Policy, ...]:
+        """The front."""
+        return self.front
+
+    def put_to(self, user: "DecisionMaker") -> Any:
+        """Return `user.weigh(self)`."""
+        return user.weigh(self)
+
+    def checked(self, answer: Any) -> tuple[float, ...]:
+        """Return weights [M] with a sum of one. Raise AnswerError."""
+        try:
+            weights = np.asarray(answer, float)
+        except (TypeError, ValueError):
+            raise AnswerError(f"weights must be {len(self.objectives)} numbers, not {_shortly(answer)}") from None
+        valid = weights.shape == (len(self.objectives),) and np.isfinite(weights).all() and (weights >= 0).all()
+        if not valid or not weights.any():
+            raise AnswerError(
+                f"weights must be {len(self.objectives)} numbers from zero upwards, not all zero, "
+                f"not {_shortly(answer)}"
+            )
+        return tuple((weights / weights.sum()).tolist())
+
+    def to_json(self, answer: Any) -> dict[str, Any]:
+        """Return the weights."""
+        return {"weights": list(answer)}
+
+    def from_json(self, fields: dict[str, Any]) -> tuple[float, ...]:
+        """Return the weights."""
+        return self.checked(fields.get("weights"))
+
+
+@dataclass(frozen=True)
+class PointQuestion(AnyQuestion):
     """Which of these points of E-NAUTILUS do you prefer? Or step back, or change how to go on."""
 
     generation: int  # whose archive this is; with `number` it names the question
@@ -65,11 +235,36 @@ class PointQuestion:
     front: tuple[Policy, ...]  # N members, in the order of the state's arrays
     state: State
     points: tuple[IntermediatePoint, ...]  # at least one
+    purpose: str = "enautilus"
 
     @property
     def representatives(self) -> tuple[Policy, ...]:
         """The policy that each point heads for."""
         return tuple(self.front[point.representative] for point in self.points)
+
+    @property
+    def shown(self) -> tuple[Policy, ...]:
+        """The policies that the points head for."""
+        return self.representatives
+
+    def put_to(self, user: "DecisionMaker") -> Any:
+        """Return `user.choose_point(self)`."""
+        return user.choose_point(self)
+
+    def checked(self, answer: Any) -> "PointAnswer":
+        """Return the answer if it is a point that is shown, or a way to go on. Raise AnswerError."""
+        if not isinstance(answer, PointAnswer):
+            raise AnswerError(f"choose_point must return Choose, Back or Adjust, not {_shortly(answer)}")
+        if isinstance(answer, Choose):
+            point = _whole("point", answer.point, 0)
+            if point >= len(self.points):
+                raise AnswerError(f"there is no point {point} among the {len(self.points)} shown, from 0")
+            return Choose(point)
+        return answer
+
+    def to_json(self, answer: Any) -> dict[str, Any]:
+        """Return the fields of the answer."""
+        return asdict(answer)
 
 
 @dataclass(frozen=True)
@@ -102,11 +297,26 @@ class DecisionMaker(ABC):
 
     @abstractmethod
     def answer(self, question: Question) -> Answer:
-        """Choose one member of the question's front."""
+        """Return which member of the question's front is preferred."""
+
+    def respond(self, question: AnyQuestion) -> Any:
+        """Return the answer to a question of any kind. Raise AnswerError for an answer that it does not allow."""
+        return question.checked(question.put_to(self))
+
+    def compare(self, question: PairQuestion) -> int | None:
+        """Return the id of the preferred one of two policies, or None for no difference; here: as `answer` has it."""
+        unbounded = np.full(len(question.objectives), -np.inf)
+        which = Question("pair", question.generation, question.objectives, question.pair, unbounded, previous=None)
+        return which.checked(self.answer(which)).policy
+
+    def weigh(self, question: WeightQuestion) -> Sequence[float]:
+        """Return how much each objective matters [M], from zero upwards."""
+        raise AnswerError(f"{type(self).__name__} cannot say how much each objective matters: it has no `weigh`")
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
-        """Answer a question of E-NAUTILUS; here: the point that heads for the policy preferred among them.
+        """Return the answer to a question of E-NAUTILUS.
 
+        Here: the point that heads for the policy that `answer` prefers among those that the points head for.
         A representative is a policy, so that any decision maker can judge it; an intermediate point is not, and
         the best reachable values seldom belong to a single one. All points mix the same previous point with
         their representatives in the same proportion: for a linear utility this is the best point, too.
@@ -115,13 +325,30 @@ class DecisionMaker(ABC):
         which = Question(
             "enautilus", question.generation, question.objectives, policies, bounds=question.state.point, previous=None
         )
-        preferred = self.answer(which).policy
+        preferred = which.checked(self.answer(which)).policy
         return Choose(next(index for index, policy in enumerate(policies) if policy.id == preferred))
 
     def utility(self, values: np.ndarray) -> np.ndarray | None:
-        """Objective vectors [N, M] to utilities [N], for the metrics; None if it has no such function."""
+        """Return the utilities [N] of objective vectors [N, M], for the metrics; None if it has no such function."""
         return None
 
     def satisfied(self, values: np.ndarray) -> bool:
-        """Whether a run with the front `values` [N, M] may stop early."""
+        """Return whether a run with the front `values` [N, M] may stop early."""
         return False
+
+
+def _whole(name: str, value: Any, least: int) -> int:
+    """Return a whole number as Python's `int`. Raise AnswerError if it is none, or less than `least`."""
+    try:
+        number = int(value) if isinstance(value, (float, np.floating)) and float(value).is_integer() else index(value)
+    except TypeError:
+        raise AnswerError(f"{name} must be a whole number, not {_shortly(value)}") from None
+    if isinstance(value, (bool, np.bool_)) or number < least:
+        raise AnswerError(f"{name} must be a whole number, at least {least}, not {_shortly(value)}")
+    return number
+
+
+def _shortly(value: Any) -> str:
+    """Return how a value is written, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."

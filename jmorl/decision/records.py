@@ -11,6 +11,10 @@ An answer of E-NAUTILUS, where `shown` has the policies that the points head for
 
 with the answers {"point": index}, {"steps": back} and {"iterations_left": h, "points": n}. `stop`, `generations` and
 the `shown` of a decision may be left out of a log written by hand.
+
+An answer to a question of any other kind, where `answer` is as that kind writes it:
+
+    {"format": 2, "purpose": "pair", "generation": 3, "answer": {"preferred": 17}, "shown": [...]}
 """
 
 import json
@@ -19,12 +23,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Discriminator, Field, Tag, TypeAdapter, ValidationError
 
-from jmorl.decision.protocol import Answer, Choose, PointAnswer, PointQuestion, Question
+from jmorl.decision.protocol import Answer, AnyQuestion, Choose, PointAnswer, PointQuestion, Question
 from jmorl.search.policy import Policy
 
-FORMAT: Literal[1] = 1
+FORMAT = 2  # the newest of any record
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Values = Annotated[tuple[Finite, ...], Field(min_length=1)]  # [M], raw units
@@ -57,7 +61,7 @@ class DecisionRecord:
     stop: bool = False
     generations: Annotated[int, Field(ge=1)] = 1
     shown: tuple[Shown, ...] = ()
-    format: Literal[1] = FORMAT
+    format: Literal[1] = 1
 
 
 @dataclass(frozen=True)
@@ -71,21 +75,57 @@ class PointRecord:
     answer: PointAnswer
     shown: tuple[Shown, ...]
     purpose: Literal["enautilus"] = "enautilus"
-    format: Literal[1] = FORMAT
+    format: Literal[1] = 1
 
     def __post_init__(self) -> None:
         if isinstance(self.answer, Choose) and not 0 <= self.answer.point < len(self.shown):
             raise ValueError(f"answer: point {self.answer.point} is none of the {len(self.shown)} shown, from 0")
 
 
-Record = DecisionRecord | PointRecord
-_RECORD: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator="purpose")])
+@dataclass(frozen=True)
+class AnswerRecord:
+    """An answered question of any other kind."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    purpose: Annotated[str, Field(min_length=1)]
+    generation: Annotated[int, Field(ge=0)]
+    answer: dict[str, Any]
+    shown: tuple[Shown, ...] = ()
+    format: Literal[2] = 2
+
+
+Record = DecisionRecord | PointRecord | AnswerRecord
+
+
+def _kind(record: Any) -> str:
+    """Return which kind of record the fields are of."""
+    fields = record if isinstance(record, dict) else vars(record)
+    known = {"steer": "decision", "final": "decision", "enautilus": "point"}
+    return known.get(str(fields.get("purpose")), "answer" if fields.get("format") == FORMAT else "")
+
+
+_RECORD: TypeAdapter[Record] = TypeAdapter(
+    Annotated[
+        Annotated[DecisionRecord, Tag("decision")]
+        | Annotated[PointRecord, Tag("point")]
+        | Annotated[AnswerRecord, Tag("answer")],
+        Discriminator(_kind),
+    ]
+)
+
+
+def record_of(question: AnyQuestion, answer: Any) -> DecisionRecord | AnswerRecord:
+    """Return what the log keeps of a question in a run and of its checked answer."""
+    if isinstance(question, Question):
+        return decision_record(question, answer)
+    return AnswerRecord(question.purpose, question.generation, question.to_json(answer), _shown(question.shown))
 
 
 def decision_record(question: Question, answer: Answer) -> DecisionRecord:
-    """What the log keeps of a question and its answer. Raises ValueError for a purpose that is never logged."""
-    if question.purpose == "enautilus":
-        raise ValueError("a question of E-NAUTILUS is logged as the PointQuestion it belongs to")
+    """Return what the log keeps of a choice. Raise ValueError for a purpose that is never logged."""
+    if question.purpose == "enautilus" or question.purpose == "pair":
+        raise ValueError(f"a choice with the purpose {question.purpose!r} is logged as the question it belongs to")
     chosen = question.policy(answer.policy)
     return DecisionRecord(
         question.purpose,
@@ -99,17 +139,17 @@ def decision_record(question: Question, answer: Answer) -> DecisionRecord:
 
 
 def point_record(question: PointQuestion, answer: PointAnswer) -> PointRecord:
-    """What the log keeps of a question of E-NAUTILUS and its answer."""
+    """Return what the log keeps of a question of E-NAUTILUS and its answer."""
     return PointRecord(question.generation, question.number, answer, _shown(question.representatives))
 
 
 def to_json(record: Record) -> str:
-    """The record as one line, without a line break."""
-    return json.dumps({"format": FORMAT, **asdict(record)}, allow_nan=False)
+    """Return the record as one line, without a line break."""
+    return json.dumps({"format": record.format, **asdict(record)}, allow_nan=False)
 
 
 def from_json(line: str, name: str = "the record") -> Record:
-    """The record of a line. Raises ScriptError saying what is wrong with the record, called `name`."""
+    """Return the record of a line. Raises ScriptError saying what is wrong with the record, called `name`."""
     try:
         fields = json.loads(line)
     except json.JSONDecodeError as error:

@@ -2,11 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, DecisionMaker, PointAnswer, PointQuestion, Question
-from jmorl.decision.records import DecisionRecord
+from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, PointAnswer, PointQuestion, Question
+from jmorl.decision.records import AnswerRecord, DecisionRecord
+
+RunRecord = DecisionRecord | AnswerRecord  # of a question that a run asks
 
 
 class Remembered(DecisionMaker):
@@ -20,21 +23,25 @@ class Remembered(DecisionMaker):
     def __init__(
         self,
         user: DecisionMaker,
-        records: Sequence[DecisionRecord] = (),
+        records: Sequence[RunRecord] = (),
         asking: Callable[[], AbstractContextManager[object]] = nullcontext,
     ):
         self.user = user
         self.records = list(records)
         self.asking = asking
 
-    def answer(self, question: Question) -> Answer:
+    def respond(self, question: AnyQuestion) -> Any:
         if self.records:
             record = self.records.pop(0)
             if is_of(record, question):
-                return Answer(record.policy, record.stop, record.generations)
+                return answer_in(record, question)
             self.records.clear()
         with self.asking():
-            return self.user.answer(question)
+            return self.user.respond(question)
+
+    def answer(self, question: Question) -> Answer:
+        answer: Answer = self.respond(question)
+        return answer
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
         return self.user.choose_point(question)
@@ -46,10 +53,17 @@ class Remembered(DecisionMaker):
         return self.user.satisfied(values)
 
 
-def is_of(record: DecisionRecord, question: Question) -> bool:
-    """Whether the record is an answer to this question."""
+def is_of(record: RunRecord, question: AnyQuestion) -> bool:
+    """Return whether the record is an answer to this question."""
     if (record.purpose, record.generation) != (question.purpose, question.generation):
         return False
-    if [shown.policy for shown in record.shown] != [policy.id for policy in question.front]:
+    if [shown.policy for shown in record.shown] != [policy.id for policy in question.shown]:
         return False
     return np.allclose([shown.values for shown in record.shown], question.values)
+
+
+def answer_in(record: RunRecord, question: AnyQuestion) -> Any:
+    """Return the answer that a record of the question holds."""
+    if isinstance(record, DecisionRecord):
+        return Answer(record.policy, record.stop, record.generations)
+    return question.from_json(record.answer)

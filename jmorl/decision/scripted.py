@@ -2,12 +2,21 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, Choose, DecisionMaker, PointAnswer, PointQuestion, Question
-from jmorl.decision.records import DecisionRecord, PointRecord, ScriptError, read_log
+from jmorl.decision.protocol import (
+    Answer,
+    AnyQuestion,
+    Choose,
+    DecisionMaker,
+    PointAnswer,
+    PointQuestion,
+    Question,
+)
+from jmorl.decision.records import AnswerRecord, DecisionRecord, PointRecord, ScriptError, read_log
+from jmorl.decision.remembered import is_of
 from jmorl.search.policy import Policy
 
 R = TypeVar("R", DecisionRecord, PointRecord)
@@ -28,6 +37,19 @@ class ScriptedUser(DecisionMaker):
         self._steering = _timeline(record for record in decisions if record.purpose == "steer")
         self._final = _timeline(record for record in decisions if record.purpose == "final")
         self._points = _timeline(record for record in records if isinstance(record, PointRecord))
+        self._others = [record for record in records if isinstance(record, AnswerRecord)]
+
+    def respond(self, question: AnyQuestion) -> Any:
+        if isinstance(question, (Question, PointQuestion)):
+            return super().respond(question)
+        # The last of equal ones: an answer that was given again replaces the earlier one.
+        for record in reversed(self._others):
+            if is_of(record, question):
+                return question.from_json(record.answer)
+        raise ScriptError(
+            f"{self.path} has no answer to this question of kind {question.purpose!r} for generation "
+            f"{question.generation}; add it, or replay the file with the settings of the run that wrote it"
+        )
 
     def answer(self, question: Question) -> Answer:
         place = question.generation, 0
@@ -56,7 +78,7 @@ class ScriptedUser(DecisionMaker):
         return Choose(self._find(chosen.policy, chosen.values, question.representatives, question.generation))
 
     def _find(self, policy: int, values: tuple[float, ...], shown: tuple[Policy, ...], generation: int) -> int:
-        """The index of the shown policy with these values; if there are several, rather the one with this id.
+        """Return the index of the shown policy with these values; if there are several, rather the one with this id.
 
         The id alone proves nothing: every run numbers its policies from zero.
         """
@@ -75,7 +97,7 @@ class ScriptedUser(DecisionMaker):
 
 
 def _timeline(records: Iterable[R]) -> dict[tuple[int, int], R]:
-    """The records by generation and number, without those that a later line goes back behind."""
+    """Return the records by generation and number, without those that a later line goes back behind."""
     kept: dict[tuple[int, int], R] = {}
     for record in records:
         place = record.generation, record.number if isinstance(record, PointRecord) else 0

@@ -15,11 +15,11 @@ import optax
 from flax import struct
 
 from envs.core import Environment, EpisodeState
-from jmorl.config import PPOConfig
 from jmorl.learning.losses import action_bound_loss, clipped_surrogate_loss, clipped_value_loss, normalize_advantages
 from jmorl.learning.networks import Actor, critic_network, gaussian_entropy, gaussian_log_probability
 from jmorl.learning.returns import discounted_sums, generalized_advantages
 from jmorl.learning.rollout import EpisodeReturns, Trajectory, episode_returns, rollout
+from jmorl.learning.settings import PPOConfig
 from jmorl.learning.statistics import (
     RunningStatistics,
     initial_statistics,

@@ -67,11 +67,11 @@ def critic_network(hidden_sizes: Sequence[int], objectives: int) -> MLP:
 
 
 def gaussian_log_probability(mean: jax.Array, log_std: jax.Array, action: jax.Array) -> jax.Array:
-    """log N(action; mean, diag exp(2 log_std)): means and actions [..., A] to [...]."""
+    """Return log N(action; mean, diag exp(2 log_std)): means and actions [..., A] to [...]."""
     z = (action - mean) * jnp.exp(-log_std)
     return (-0.5 * z**2 - log_std - 0.5 * math.log(2 * math.pi)).sum(-1)
 
 
 def gaussian_entropy(log_std: jax.Array) -> jax.Array:
-    """The entropy in nats of a diagonal Gaussian with log standard deviations [A]."""
+    """Return the entropy in nats of a diagonal Gaussian with log standard deviations [A]."""
     return (log_std + 0.5 * math.log(2 * math.pi * math.e)).sum()

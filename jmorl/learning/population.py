@@ -6,10 +6,10 @@ import jax
 import numpy as np
 
 from envs.core import Environment
-from jmorl.config import Config
-from jmorl.learning.moppo import FAULTS, Diagnostics, TrainState
-from jmorl.learning.programs import CompiledPrograms, Programs, schedule_of
+from jmorl.learning.moppo import FAULTS, Diagnostics, Schedule, TrainState
+from jmorl.learning.programs import Programs, compiled
 from jmorl.learning.rollout import EpisodeReturns
+from jmorl.learning.settings import LearningConfig
 
 
 class TrainingFault(RuntimeError):
@@ -17,18 +17,19 @@ class TrainingFault(RuntimeError):
 
 
 class Population:
-    """P agents trained and evaluated side by side, each call one compiled program.
+    """P agents trained and evaluated side by side, each call one compiled program. Train states have a leading P axis.
 
-    The programs are its own, or those that several runs share (`jmorl.learning.stack`). Learners have a leading P axis.
+    Populations of one environment and one `LearningConfig` use the same programs. Raises NotAsDeclared for an
+    environment that is not what it says.
     """
 
-    def __init__(self, environment: Environment[Any], config: Config, programs: Programs | None = None):
-        self.size = config.population.agents
-        self.programs: Programs = programs or CompiledPrograms(environment, config)
+    def __init__(self, environment: Environment[Any], config: LearningConfig):
+        self.size = config.agents
+        self.programs: Programs = compiled(environment, config)
 
     @property
     def devices(self) -> int:
-        """How many devices the agents are spread over."""
+        """How many devices share the agents."""
         return self.programs.devices
 
     def compile(self) -> float:
@@ -36,33 +37,40 @@ class Population:
         return self.programs.compile()
 
     def initialize(self, key: jax.Array) -> TrainState:
-        """P new train states [P, ...]."""
+        """Return P new train states [P, ...]."""
         return self.programs.initialize(jax.random.split(key, self.size))
 
     def train(
         self, train_states: TrainState, weights: np.ndarray, key: jax.Array, iterations: int, learning_rate: float
     ) -> tuple[TrainState, Diagnostics]:
-        """Train every agent [P, ...] with its weights [P, M] for `iterations` PPO iterations at one
-        learning rate.
+        """Train every agent [P, ...] with its weights [P, M] for some PPO iterations at one learning rate.
 
         Raises TrainingFault, naming agents, causes and iterations, if any number stopped being finite.
         """
         keys = jax.random.split(key, self.size)
-        schedule = schedule_of(iterations, learning_rate)
-        train_states, diagnostics = self.programs.train(train_states, np.asarray(weights, np.float32), keys, schedule)
+        schedule = Schedule(np.int32(iterations), np.float32(learning_rate))
+        train_states, diagnostics = self._train(train_states, np.asarray(weights, np.float32), keys, schedule)
         _raise_faults(diagnostics)
         return train_states, diagnostics
 
     def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
-        """Returns [P, episodes, M] of every agent from the same keys [episodes], with traces for paper units.
+        """Score every agent from the same keys [episodes]: returns [P, episodes, M], with traces for paper units.
 
         Raises TrainingFault, naming the agents, if a return is not finite.
         """
-        returns = self.programs.evaluate(train_states, keys)
+        returns = self._evaluate(train_states, keys)
         faulty = np.flatnonzero(~np.isfinite(returns.undiscounted).all((1, 2)))
         if len(faulty):
             raise TrainingFault("; ".join(f"agent {agent}: a return is not finite in evaluation" for agent in faulty))
         return returns
+
+    def _train(
+        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[TrainState, Diagnostics]:
+        return self.programs.train(train_states, weights, keys, schedule)
+
+    def _evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        return self.programs.evaluate(train_states, keys)
 
 
 def _raise_faults(diagnostics: Diagnostics) -> None:

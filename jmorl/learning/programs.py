@@ -1,9 +1,13 @@
-"""Agents vmapped, and their axis sharded over all devices. The only `jit` of the project."""
+"""Agents vmapped, and their axis sharded over all devices.
+
+The only `jit` of the project, and the cache of what it made.
+"""
 
 import time
 from collections.abc import Callable
-from functools import partial
-from typing import Any, Protocol
+from functools import lru_cache, partial
+from threading import Lock
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -12,88 +16,96 @@ from jax.sharding import Mesh, PartitionSpec
 
 from envs.checks import check_environment
 from envs.core import Environment
-from jmorl.config import Config
 from jmorl.learning.moppo import MOPPO, Diagnostics, Schedule, TrainState
 from jmorl.learning.rollout import EpisodeReturns
+from jmorl.learning.settings import LearningConfig
 
 AGENTS = "agents"  # the mesh axis
+MOST_KEPT = 16  # programs of so many shapes are kept; those used least recently go first
 
 
-class Programs(Protocol):
-    """Training and evaluation of N agents side by side, P of each run, each of them one call.
+class Programs:
+    """Training and evaluation of N agents side by side, P of each of some runs, each of them one compiled call.
 
-    Learners cross this boundary as host arrays with a leading N axis, so that the search can store, mix and
-    inherit them without touching a device.
+    Train states cross this boundary as host arrays with a leading N axis, so that the search can store, mix and
+    inherit them without touching a device. Get them from `compiled`, so that nothing is compiled twice. Raises
+    NotAsDeclared for an environment that is not what it says.
     """
 
-    @property
-    def devices(self) -> int:
-        """How many devices the agents are spread over."""
-
-    def compile(self) -> float:
-        """Compile what is to be called. Returns the seconds it took; nothing is traced or compiled a second time."""
-
-    def initialize(self, keys: jax.Array) -> TrainState:
-        """A new train state for each key [N]."""
-
-    def train(
-        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
-    ) -> tuple[TrainState, Diagnostics]:
-        """Train every agent [N, ...] with its weights [N, M] and its key [N]."""
-
-    def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
-        """Returns [N, episodes, M] of every agent [N, ...], a run's from equal keys: [episodes] of each in turn."""
-
-
-class CompiledPrograms:
-    """The programs for so many runs. Raises NotAsDeclared for an environment that is not what it says."""
-
-    def __init__(self, environment: Environment[Any], config: Config, runs: int = 1):
+    def __init__(self, environment: Environment[Any], config: LearningConfig, runs: int = 1):
         check_environment(environment)
         self.runs = runs
-        self.agents = runs * config.population.agents
+        self.agents = runs * config.agents
         self.episodes = config.evaluation.episodes
+        self._compiling = Lock()
         self._compiled = False
         self.moppo = MOPPO(environment, config.ppo)
-        self.devices = device_count(self.agents, jax.device_count())
+        self.devices = device_count(self.agents, jax.device_count())  # that share the agents
         mesh = Mesh(np.array(jax.devices()[: self.devices]), (AGENTS,))
         self._initialize = jax.jit(jax.vmap(self.moppo.initial_train_state))
         self._train = _sharded(self.moppo.train, mesh, shared=1)
         sampled, traced = config.evaluation.actions == "sampled", config.evaluation.units == "paper"
         evaluate = _sharded(partial(self.moppo.evaluate, sampled=sampled, traced=traced), mesh)
-        each = config.population.agents
+        each = config.agents
         self._evaluate: Any = jax.jit(
             lambda train_states, keys: evaluate(train_states, jnp.repeat(keys.reshape(runs, -1), each, axis=0))
         )
 
     def compile(self) -> float:
-        if self._compiled:
-            return 0.0
-        started = time.perf_counter()
-        keys = jax.random.split(jax.random.key(0), self.agents)
-        start_keys = jax.random.split(jax.random.key(0), self.runs * self.episodes)
-        train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
-        weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
-        self._train = self._train.lower(train_states, weights, keys, schedule_of(0, 0.0)).compile()
-        self._evaluate = self._evaluate.lower(train_states, start_keys).compile()
-        self._compiled = True
-        return time.perf_counter() - started
+        """Compile what is to be called, if it is not. Returns the seconds it took; nothing is traced a second time."""
+        with self._compiling:
+            if self._compiled:
+                return 0.0
+            started = time.perf_counter()
+            keys = jax.random.split(jax.random.key(0), self.agents)
+            start_keys = jax.random.split(jax.random.key(0), self.runs * self.episodes)
+            train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
+            weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
+            schedule = Schedule(np.int32(0), np.float32(0))
+            self._train = self._train.lower(train_states, weights, keys, schedule).compile()
+            self._evaluate = self._evaluate.lower(train_states, start_keys).compile()
+            self._compiled = True
+            return time.perf_counter() - started
 
     def initialize(self, keys: jax.Array) -> TrainState:
+        """Return a new train state for each key [N]."""
         return jax.device_get(self._initialize(keys))
 
     def train(
         self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
     ) -> tuple[TrainState, Diagnostics]:
+        """Train every agent [N, ...] with its weights [N, M] and its key [N]."""
         return jax.device_get(self._train(train_states, weights, keys, schedule))
 
     def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        """Return the returns [N, episodes, M] of every agent [N, ...], a run's from equal keys.
+
+        `keys` has [episodes] of each run in turn.
+        """
         return jax.device_get(self._evaluate(train_states, keys))
 
 
-def schedule_of(iterations: int, learning_rate: float) -> Schedule:
-    """As the compiled programs take it."""
-    return Schedule(np.int32(iterations), np.float32(learning_rate))
+def compiled(environment: Environment[Any], config: LearningConfig, runs: int = 1) -> Programs:
+    """Return the programs for an environment and settings: always the same, which the process compiles once."""
+    return _programs(_Itself(environment), config, runs)
+
+
+class _Itself:
+    """An environment that equals itself alone, whatever equality its class defines."""
+
+    def __init__(self, environment: Environment[Any]):
+        self.environment = environment
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and self.environment is other.environment
+
+    def __hash__(self) -> int:
+        return id(self.environment)
+
+
+@lru_cache(MOST_KEPT)
+def _programs(of: _Itself, config: LearningConfig, runs: int) -> Programs:
+    return Programs(of.environment, config, runs)
 
 
 def device_count(agents: int, available: int) -> int:
@@ -102,7 +114,7 @@ def device_count(agents: int, available: int) -> int:
 
 
 def _sharded(function: Callable[..., Any], mesh: Mesh, shared: int = 0) -> Any:
-    """`function` of one agent as one compiled call for N: all arguments but the last, `shared` ones have an N axis."""
+    """Compile `function` of one agent for N: all arguments have an N axis, but for the last `shared` ones."""
 
     def all_agents(*arguments: Any) -> Any:
         own = len(arguments) - shared

@@ -1,7 +1,7 @@
 """Several runs in one program: runs, with their seeds, as one more axis that is vmapped and sharded.
 
-Each run goes on in a thread of its own and has a seat, which is the programs of its population. What a run finds
-may depend in the last bits on how many share a program, as it does on the machine.
+Each run goes on in a thread of its own with a population of its own, whose calls are made together with the others'.
+What a run finds may depend in the last bits on how many share a program, as it does on the machine.
 """
 
 import threading
@@ -17,48 +17,30 @@ import jax.numpy as jnp
 import numpy as np
 
 from envs.core import Environment
-from jmorl.config import Config
 from jmorl.learning.moppo import Diagnostics, Schedule, TrainState
-from jmorl.learning.programs import CompiledPrograms
+from jmorl.learning.population import Population
+from jmorl.learning.programs import Programs, compiled
 from jmorl.learning.rollout import EpisodeReturns
+from jmorl.learning.settings import LearningConfig
 
 
 class Stack:
-    """The programs of runs with equal environment, population, PPO and evaluation, for any number of them at a time."""
+    """Runs of one environment and one `LearningConfig` that begin together and share every call."""
 
-    def __init__(self, environment: Environment[Any], config: Config):
+    def __init__(self, environment: Environment[Any], config: LearningConfig, runs: int):
         self.environment = environment
         self.config = config
-        self._programs: dict[int, CompiledPrograms] = {}  # by the number of runs
+        self.runs = runs  # that go on
         self._turn = threading.Condition()
-        self._seats = 0  # taken
-        self._calls: dict[int, _Call] = {}  # of seats that wait, by their number
+        self._calls: dict[int, _Call] = {}  # of runs that wait, by their number
+        self.populations = [StackedPopulation(self, number) for number in range(runs)]
 
-    def seats(self, runs: int) -> list["Seat"]:
-        """For so many runs that begin together; every one is to be left at its end."""
-        if self._seats:
-            raise ValueError("the runs before have not left their seats")
-        self._seats = runs
-        return [Seat(self, number) for number in range(runs)]
-
-    @property
-    def devices(self) -> int:
-        """How many devices the agents of all seats are spread over."""
-        with self._turn:
-            return self._programs_of(self._seats).devices
-
-    def compile(self) -> float:
-        """Compile the programs for all seats that are taken."""
-        with self._turn:
-            return self._programs_of(self._seats).compile()
-
-    def initialize(self, keys: jax.Array) -> TrainState:
-        """The first train states of one run."""
-        with self._turn:
-            return self._programs_of(1).initialize(keys)
+    def programs(self, runs: int) -> Programs:
+        """Return the programs for so many of the runs."""
+        return compiled(self.environment, self.config, runs)
 
     def call(self, number: int, call: "_Call") -> Any:
-        """Answer the call of a seat together with the others': once each of them has made one, or has left."""
+        """Answer the call of a run together with the others': once each of them has made one, or has left."""
         with self._turn:
             self._calls[number] = call
             self._answer_if_complete()
@@ -67,19 +49,14 @@ class Stack:
             raise call.error
         return call.result
 
-    def leave(self, number: int) -> None:
-        """A seat's run is over."""
+    def leave(self) -> None:
+        """Wait for one run less: it is over."""
         with self._turn:
-            self._seats -= 1
+            self.runs -= 1
             self._answer_if_complete()
 
-    def _programs_of(self, runs: int) -> CompiledPrograms:
-        if runs not in self._programs:
-            self._programs[runs] = CompiledPrograms(self.environment, self.config, runs)
-        return self._programs[runs]
-
     def _answer_if_complete(self) -> None:
-        if not self._calls or len(self._calls) < self._seats:
+        if not self._calls or len(self._calls) < self.runs:
             return
         calls = [self._calls[number] for number in sorted(self._calls)]
         self._calls.clear()
@@ -88,9 +65,9 @@ class Stack:
         self._turn.notify_all()
 
     def _answer(self, calls: Sequence["_Call"]) -> None:
-        """Calls that are alike, as one. What goes wrong goes wrong for each of them."""
+        """Answer calls that are alike as one. What goes wrong goes wrong for each of them."""
         try:
-            programs = self._programs_of(len(calls))
+            programs = self.programs(len(calls))
             programs.compile()
             train_states = jax.tree.map(lambda *leaves: np.concatenate(leaves), *(call.train_states for call in calls))
             keys = jnp.concatenate([call.keys for call in calls])
@@ -100,7 +77,7 @@ class Stack:
             else:
                 weights = np.concatenate([call.weights for call in calls if call.weights is not None])
                 result = programs.train(train_states, weights, keys, schedule)
-            own = self.config.population.agents
+            own = self.config.agents
             for index, call in enumerate(calls):
                 call.result = jax.tree.map(partial(_part, start=index * own, stop=(index + 1) * own), result)
         except Exception as error:
@@ -108,6 +85,41 @@ class Stack:
                 call.error = error
         for call in calls:
             call.answered = True
+
+
+class StackedPopulation(Population, AbstractContextManager["StackedPopulation"]):
+    """The population of one run in a stack, to be used in the run's thread; leaving the block leaves the stack."""
+
+    def __init__(self, stack: Stack, number: int):
+        super().__init__(stack.environment, stack.config)
+        self._stack = stack
+        self._number = number
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._stack.leave()
+
+    @property
+    def devices(self) -> int:
+        """How many devices share the agents of all runs."""
+        return self._stack.programs(self._stack.runs).devices
+
+    def compile(self) -> float:
+        """Compile the programs for all runs that go on. Returns the seconds it took."""
+        return self._stack.programs(self._stack.runs).compile()
+
+    def _train(
+        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
+    ) -> tuple[TrainState, Diagnostics]:
+        trained: tuple[TrainState, Diagnostics] = self._stack.call(
+            self._number, _Call(train_states, keys, weights, schedule)
+        )
+        return trained
+
+    def _evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        returns: EpisodeReturns = self._stack.call(self._number, _Call(train_states, keys))
+        return returns
 
 
 @dataclass(eq=False)
@@ -126,37 +138,6 @@ class _Call:
     def kind(self) -> Hashable:
         """Equal for calls that can be made as one."""
         return None if self.schedule is None else tuple(np.asarray(each).item() for each in self.schedule)
-
-
-class Seat(AbstractContextManager["Seat"]):
-    """The programs of one run's population, to be called in its thread; at the end of the block the seat is left."""
-
-    def __init__(self, stack: Stack, number: int):
-        self._stack = stack
-        self._number = number
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stack.leave(self._number)
-
-    @property
-    def devices(self) -> int:
-        return self._stack.devices
-
-    def compile(self) -> float:
-        return self._stack.compile()
-
-    def initialize(self, keys: jax.Array) -> TrainState:
-        return self._stack.initialize(keys)
-
-    def train(
-        self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
-    ) -> tuple[TrainState, Diagnostics]:
-        return self._stack.call(self._number, _Call(train_states, keys, weights, schedule))
-
-    def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
-        return self._stack.call(self._number, _Call(train_states, keys))
 
 
 def _part(leaf: Any, start: int, stop: int) -> Any:

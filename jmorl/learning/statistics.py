@@ -46,7 +46,7 @@ def normalize(statistics: RunningStatistics, x: jax.Array) -> jax.Array:
 
 
 def return_scale(statistics: RunningStatistics) -> jax.Array:
-    """What rewards are divided by: the standard deviation of their discounted sums, [M].
+    """Return what rewards are divided by: the standard deviation of their discounted sums, [M].
 
     An objective whose sums (next to) never vary has no scale of that kind and takes their size instead.
     """

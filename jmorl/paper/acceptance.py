@@ -1,14 +1,25 @@
-"""What was to be shown: in raw units that interaction helps, in paper units why our numbers are not the published."""
+"""Acceptance of the results: in raw units by a criterion, in paper units by explaining what is not as published.
+
+The acceptance criterion, for each target: the interactive method succeeds as often as PGMORL and as the best published
+row, and for targets B and C in fewer steps than PGMORL.
+"""
 
 from collections.abc import Sequence
 
+from jmorl.experiments.statistics import Difference
+from jmorl.experiments.tables import million, share
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.data import PublishedTable
-from jmorl.paper.naming import million, named, sentence, share
-from jmorl.paper.results import Pair, TargetRow, pair_of
-from jmorl.paper.statistics import Difference
+from jmorl.paper.drift import at_the_start, by_untrained, drifted, prevented
+from jmorl.paper.plan import named
+from jmorl.paper.results import Pair, pair_of
 from jmorl.paper.verdicts import METHODS, against_published, order, published_order, shown, steps_saved
 
-FASTER = ("B", "C")  # targets for which fewer steps are asked for, too
+ACCEPTANCE_CRITERION = (
+    "The acceptance criterion: the interactive method succeeds as often as PGMORL and as the best published row, and "
+    "for targets B and C in fewer steps."
+)
+FASTER = ("B", "C")  # targets for which the criterion asks for fewer steps, too
 
 UNCOPIED = (
     "by elimination, of what their program does and this one does not: its bounds in place of the chosen policy's "
@@ -17,10 +28,8 @@ UNCOPIED = (
 )
 
 
-def raw_bar(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
-    """One target: whether the interactive method succeeds as often as PGMORL and as the best published row, and for B
-    and C with fewer steps; with the mechanism wherever it does not.
-    """
+def acceptance_verdict(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
+    """Say whether one target meets the acceptance criterion; with the mechanism of the search where it does not."""
     target, pair = rows[0].target, pair_of(rows)
     if pair is None:
         return f"Target {target}: not to be judged yet, as runs of one method are missing."
@@ -38,12 +47,14 @@ def raw_bar(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
         + ("" if target in FASTER else ", which is not asked for here")
     )
     if not misses:
-        return f"Target {target}: met{_how_surely(target, pair.difference)}. {sentence(counts)}; {steps}."
-    return f"Target {target}: not met: {' and '.join(misses)}. {sentence(counts)}; {steps}. {sentence(shown([ours]))}."
+        return f"Target {target}: met{_how_surely(target, pair.difference)}. {_sentence(counts)}; {steps}."
+    return (
+        f"Target {target}: not met: {' and '.join(misses)}. {_sentence(counts)}; {steps}. {_sentence(shown([ours]))}."
+    )
 
 
 def _misses(pair: Pair, best: float) -> list[str]:
-    """What is short of the bar. `best`: share of the runs of the best published row that succeed."""
+    """Return what the criterion asks for and is not met. `best`: the successful share of the best published row."""
     ours, theirs = (row.times.successes / len(row.seeds) for row in pair.rows)
     return [
         *(["it succeeds less often than PGMORL"] if ours < theirs else []),
@@ -53,12 +64,13 @@ def _misses(pair: Pair, best: float) -> list[str]:
 
 
 def _how_surely(target: str, difference: Difference) -> str:
+    """Write how sure the steps saved are, where the criterion asks for them."""
     return f", in steps {difference.certainty}" if target in FASTER else ""
 
 
 def explanations(published: PublishedTable, rows: Sequence[TargetRow]) -> list[str]:
-    """Paper units, one target: for each method whose successes, or whose place, are not the published ones, which of
-    moving units, a defect that is not copied, or our own shortfall the numbers point to.
+    """Explain the differences on one target in paper units: a sentence for each method whose successes, or place, are
+    not the published ones. The cause is moving units, a defect that is not copied, or our own shortfall.
     """
     pair = pair_of(rows)
     if pair is None:
@@ -85,35 +97,41 @@ def _explanation(published: PublishedTable, row: TargetRow) -> str:
 
 
 def _cause_of_more(row: TargetRow) -> str:
-    if row.at_the_start:
+    if at_the_start(row):
         return (
-            f"An uncopied defect: {row.at_the_start} of the successes come with generation 0 ({row.untrained} by "
+            f"An uncopied defect: {at_the_start(row)} of the successes come with generation 0 ({by_untrained(row)} by "
             "untrained policies), where their program does not check."
         )
-    if row.drifted:
+    if drifted(row):
         return (
-            f"Drift: {row.drifted} of the {row.times.successes} successes are of no trained policy that would do in "
+            f"Drift: {drifted(row)} of the {row.times.successes} successes are of no trained policy that would do in "
             "the units after the warm-up."
         )
     return f"An uncopied defect, {UNCOPIED}; none of the successes is owed to moving units."
 
 
 def _cause_of_less(row: TargetRow) -> str:
-    if row.prevented:
+    if prevented(row):
         return (
-            f"Drift: {row.prevented} of the runs that never arrive have a trained policy that would do in the units "
+            f"Drift: {prevented(row)} of the runs that never arrive have a trained policy that would do in the units "
             "after the warm-up."
         )
-    return f"Our own shortfall: moving units hide no success. {sentence(shown([row]))}."
+    return f"Our own shortfall: moving units hide no success. {_sentence(shown([row]))}."
 
 
 def drift_told(row: TargetRow) -> str:
-    """Whether successes in paper units are of policies or of units."""
+    """Say whether successes in paper units are owed to policies or to units."""
     of = "1 success" if row.times.successes == 1 else f"{row.times.successes} successes"
-    if not row.drifted:
+    owed = drifted(row)
+    if not owed:
         return f"Target {row.target}: none of {named(row.method)}'s {of} is owed to moving units."
-    start = f", {row.untrained} of them of policies never trained" if row.untrained else ""
+    start = f", {by_untrained(row)} of them of policies never trained" if by_untrained(row) else ""
     return (
-        f"Target {row.target}: {row.drifted} of {named(row.method)}'s {of} are owed to moving units{start}: no trained "
+        f"Target {row.target}: {owed} of {named(row.method)}'s {of} are owed to moving units{start}: no trained "
         "policy found by then would do in the units after the warm-up."
     )
+
+
+def _sentence(text: str) -> str:
+    """Begin a text with a capital letter."""
+    return text[0].upper() + text[1:]

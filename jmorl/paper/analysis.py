@@ -1,4 +1,4 @@
-"""From the records of runs to what tables and figures show.
+"""Analysis of records: the numbers that the tables and figures show.
 
 Letters: S runs, G generations, N policies, M objectives.
 """
@@ -12,8 +12,8 @@ from envs import make
 from jmorl.config import Config
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.utility import UtilityUser, linear_utility
-from jmorl.paper.drift import reached_without_drift, untrained
-from jmorl.paper.record import RunRecord
+from jmorl.experiments.record import RunRecord
+from jmorl.paper.drift import untrained
 from jmorl.search.bounds import within
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Policy, values_of
@@ -22,68 +22,34 @@ from jmorl.units import measured_in
 ENAUTILUS_ITERATIONS, ENAUTILUS_POINTS = 3, 3  # the paper's
 
 
-@dataclass(frozen=True)
-class Reached:
-    """When and how a run reached a target first."""
-
-    generation: int
-    steps: int
-    seconds: float  # compilation not counted
-    policy: int  # id: of those that reached it, the one that clears it by most in its tightest objective
-    untrained: bool  # whether none of those that reached it had been trained
-    without_drift: bool  # whether any trained policy found by then had reached it in the units after the warm-up
-
-
-def reached(record: RunRecord, target: Sequence[float], cap: float = np.inf) -> Reached | None:
-    """The first generation whose archive has a policy at least as good as the target in every objective.
-
-    None if there is none that ends within `cap` steps.
-    """
-    for number, generation in enumerate(record.generations):
-        ids = np.array(generation.front)
-        values = record.values[ids]
-        inside = within(values, np.array(target))
-        if generation.steps <= cap and inside.any():
-            margins = np.where(inside, (values - target).min(axis=1), -np.inf)
-            return Reached(
-                number,
-                generation.steps,
-                float(record.seconds[number]),
-                int(ids[np.argmax(margins)]),
-                bool(untrained(record)[ids[inside]].all()),
-                reached_without_drift(record, target, number),
-            )
-    return None
-
-
 def generations_within(record: RunRecord, steps: int) -> int:
-    """How many generations, the warm-up included, the run has within a smaller or equal budget of steps."""
+    """Count the generations of a run, the warm-up included, within a smaller or equal budget of steps."""
     iteration = Config.model_validate(record.config).steps_per_iteration
     before = record.steps[:-1] // iteration
     return 1 + int((before < steps // iteration).sum())
 
 
 def seconds_within(record: RunRecord, steps: int) -> float:
-    """What the run takes within a smaller or equal budget of steps; compilation not counted."""
+    """Return the seconds that a run takes within a smaller or equal budget of steps; compilation not counted."""
     return float(record.seconds[generations_within(record, steps) - 1])
 
 
 def greatest_utility(record: RunRecord, weights: Sequence[float], steps: int) -> np.ndarray:  # [G + 1]
-    """Of the archive, after each generation (the paper's U_max)."""
+    """Return the greatest utility in the archive after each generation (the paper's U_max)."""
     utilities = record.values @ np.array(weights)
     fronts = [generation.front for generation in record.generations[: generations_within(record, steps)]]
     return np.array([utilities[list(front)].max() for front in fronts])
 
 
 def offspring_utility(record: RunRecord, weights: Sequence[float], steps: int) -> np.ndarray:  # [G + 1]
-    """Mean of the policies just trained, in each generation: a set that no bounds have filtered or sorted."""
+    """Return the mean utility of the policies just trained, in each generation. No bounds filter or sort them."""
     utilities, born = record.values @ np.array(weights), record.born
     trained = ~untrained(record)
     return np.array([utilities[(born == g) & trained].mean() for g in range(generations_within(record, steps))])
 
 
 def buffer_utility(record: RunRecord, weights: Sequence[float], steps: int, bounded: bool = False) -> np.ndarray:
-    """Mean of the performance buffer, after each generation [G + 1]: what the authors measure.
+    """Return the mean utility of the performance buffer after each generation [G + 1], which the authors measure.
 
     With the scale "range" the bounds decide how the interactive method's buffer is sorted, so that it is not the same
     kind of set for every method. `bounded`: of its members within the bounds only, as the authors take it for the
@@ -128,21 +94,21 @@ def finals(
 
 
 def pooled_front(records: Sequence[RunRecord], steps: int) -> np.ndarray:  # [N, M]
-    """What is not dominated of all archives as they were after so many steps."""
+    """Return the non-dominated values of all archives together, as they were after `steps`."""
     last = [record.generations[generations_within(record, steps) - 1] for record in records]
     pooled = np.vstack([record.values[list(each.front)] for record, each in zip(records, last, strict=True)])
     return pooled[non_dominated(pooled)]
 
 
 def non_dominated_or_equal(values: np.ndarray) -> np.ndarray:  # [N] bool
-    """Which vectors [N, M] no other dominates; equal ones do not dominate each other."""
+    """Return which vectors [N, M] no other dominates; equal ones do not dominate each other."""
     as_good = (values[:, None] >= values[None]).all(axis=2)
     better = (values[:, None] > values[None]).any(axis=2)
     return np.asarray(~(as_good & better).any(axis=0))
 
 
 def _enautilus(front: np.ndarray, record: RunRecord, weights: Sequence[float]) -> int:
-    """The row of the front [N, M] that a user with these weights is led to, in 3 iterations of 3 points."""
+    """Return the row of the front [N, M] that a user with these weights is led to, in 3 iterations of 3 points."""
     nothing = np.zeros(front.shape[1])
     policies = tuple(Policy(row, 0, None, nothing, z, nothing, nothing, None) for row, z in enumerate(front))
     config = Config.model_validate(record.config)

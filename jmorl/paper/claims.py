@@ -1,15 +1,16 @@
-"""Whether what the paper's text says of its figures is found: each statement by rule, then the figure's verdict."""
+"""Verdicts on the paper's figures: each statement of its text by a rule, then the figure by its statements."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from jmorl.experiments.statistics import Difference
+from jmorl.experiments.tables import million
 from jmorl.paper.analysis import Finals, non_dominated_or_equal
 from jmorl.paper.data import Claims
-from jmorl.paper.naming import million, named
+from jmorl.paper.plan import named
 from jmorl.paper.results import Curves, curve_pairs
-from jmorl.paper.statistics import Difference
 from jmorl.paper.verdicts import MISSING, ahead
 
 SETTLED = 0.05  # of a curve's range from its end: where it has settled
@@ -25,7 +26,7 @@ class Check:
 
 
 def conclusion(checks: Sequence[Check]) -> str:
-    """One sentence: whether a figure's conclusion holds, and because of what."""
+    """Say whether a figure's conclusion holds, and because of which statements."""
     if not checks:
         return MISSING
     found, against, open_ = ([check.text for check in checks if check.holds is each] for each in (True, False, None))
@@ -43,7 +44,7 @@ def conclusion(checks: Sequence[Check]) -> str:
 
 
 def curve_checks(claims: Claims, rows: Sequence[Curves]) -> list[Check]:
-    """Of a figure of utilities."""
+    """Check the statements of a figure of utilities."""
     pairs = list(curve_pairs(rows))
     checks = [_ends(claims.ahead[ours.user], ours, theirs, found) for ours, theirs, found in pairs]
     return checks + [
@@ -75,7 +76,7 @@ def _settles_earlier(ours: Curves, theirs: Curves) -> Check:
 
 
 def _settled(row: Curves) -> float:
-    """The steps from which on the mean over seeds stays near its end."""
+    """Return the steps after which the mean over seeds stays near its end."""
     course = row.course
     away = np.flatnonzero(np.abs(course - course[-1]) > SETTLED * np.ptp(course))
     return float(row.steps[away[-1] + 1] if len(away) else row.steps[0])
@@ -101,7 +102,7 @@ def _varies_more(ours: Curves, theirs: Curves) -> Check | None:
 
 
 def _varies(ours: Curves, theirs: Curves, more: bool) -> Check | None:
-    """Standard deviations over the seeds at the end; None for one seed."""
+    """Compare the standard deviations over the seeds at the end; None for one seed."""
     if min(len(ours.seeds), len(theirs.seeds)) < 2:
         return None
     one, other = (float(row.last.std(ddof=1)) for row in (ours, theirs))
@@ -110,7 +111,7 @@ def _varies(ours: Curves, theirs: Curves, more: bool) -> Check | None:
 
 
 def _catches_up(ours: Curves, theirs: Curves) -> Check | None:
-    """For user A: the interactive method is ahead in the middle of its first half, and behind at the end."""
+    """Check for user A that the interactive method is ahead after a quarter of the steps, and behind at the end."""
     if ours.user != "A":
         return None
     early = float(np.interp(ours.steps[-1] / 4, ours.steps, ours.course))
@@ -134,14 +135,14 @@ Found = Mapping[str, Finals]  # by user
 
 
 def finals_checks(claims: Claims, found: Found, before: Found) -> list[Check]:
-    """Of a figure of final policies of all users; `before`: those of Figure 9, which Figure 10 is compared with."""
+    """Check the statements of a figure of final policies. `before`: those of Figure 9, to compare Figure 10 with."""
     if set(found) != {"A", "B", "C"}:
         return []
     return [FINALS_STATEMENTS[name](found, before) for name in claims.also]
 
 
 def _placed(found: Found) -> tuple[np.ndarray, np.ndarray]:
-    """The interactive method's final policies [users * S, M] and E-NAUTILUS's [users, M], in the front's range."""
+    """Return the final policies, interactive [users * S, M] and by E-NAUTILUS [users, M], in the front's range."""
     pooled = next(iter(found.values())).pooled
     extent = np.ptp(pooled, axis=0)
     ours = np.vstack([finals.interactive for finals in found.values()])
@@ -232,7 +233,7 @@ FINALS_STATEMENTS: Mapping[str, Callable[[Found, Found], Check]] = {
 
 
 def finals_told(found: Found, weights: Mapping[str, Sequence[float]]) -> str:
-    """Whose utility is greater, and who dominates whom."""
+    """Say whose utility is greater, and who dominates whom."""
     sentences = []
     for user, finals in found.items():
         w = np.array(weights[user])

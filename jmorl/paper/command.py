@@ -8,11 +8,11 @@ from pathlib import Path
 from jmorl.display.console import PlainConsole
 from jmorl.display.text import duration, short_count
 from jmorl.events import Event, GenerationFinished, RunFinished
-from jmorl.paper.naming import named
-from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, SHORTER, Cell, Plan, distinct, in_order
+from jmorl.experiments.cells import Cell, Places, distinct, groups, known, missing
+from jmorl.experiments.runner import make
+from jmorl.paper.pilots import propose
+from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, SHORTER, Plan, in_order, named
 from jmorl.paper.report import Scope, write_report
-from jmorl.paper.runner import Places, groups, known, make, missing
-from jmorl.paper.targets import propose
 from jmorl.signals import StopSignals
 
 
@@ -36,13 +36,14 @@ def make_paper(
     out = out or Path("runs/paper-quick" if quick else "benchmarks/paper")
     places = Places(out / "records", work or (out / "work" if quick else Path("runs/paper")))
     items = [item for item in ITEMS.values() if only is None or item.name in only]
-    wanted = [(item, each, plan.cells(item, each)) for item, each in in_order(items, units)]
-    parts = [_Part(item.name, each, [cell for cell in cells if not cell.later]) for item, each, cells in wanted]
+    later = {(item.name, each): plan.later(item, each) for item, each in in_order(items, units)}
+    parts = [
+        _Part(item.name, each, [cell for cell in plan.cells(item, each) if cell not in later[item.name, each]])
+        for item, each in in_order(items, units)
+    ]
     if only and "targets" in only:
         parts.append(_Part(f"targets, {NAMES[CHEETAH]}", "raw", plan.pilots(CHEETAH)))
-    for item, each, cells in wanted:
-        later = [cell for cell in cells if cell.later]
-        parts += [_Part(f"{item.name}, {named(SHORTER)}", each, later)] if later else []
+    parts += [_Part(f"{name}, {named(SHORTER)}", each, cells) for (name, each), cells in later.items() if cells]
     if run:
         _make_all(parts, places, together, console)
     if only and "targets" in only:
@@ -64,7 +65,7 @@ class _Part:
 
 
 def _make_all(parts: Sequence[_Part], places: Places, together: int, console: PlainConsole) -> None:
-    """Every part's missing runs. What two parts share is made with the first."""
+    """Make every part's missing runs. What two parts share is made with the first."""
     with StopSignals("stopping after this generation; the same command goes on from there") as stop:
         for part in parts:
             name = f"{part.name}, {part.units} units"

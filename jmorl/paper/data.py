@@ -1,4 +1,4 @@
-"""What is known beforehand: the published numbers, and what the experiment in raw units fixed."""
+"""Data known before the runs: the published numbers, and what the experiment in raw units fixed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ class PublishedTable:
         return next(row for row in self.rows if (row.target, row.method) == (target, method))
 
     def mean_steps(self, target: str, method: str) -> float:
-        """The restricted mean: without a success, the cap."""
+        """Return the restricted mean: without a success, the cap."""
         return self.row(target, method).mean_steps or self.cap_steps
 
     @property
@@ -87,7 +87,7 @@ def published() -> Published:
 
 @cache
 def honest(env: str) -> Honest:
-    """For an environment id of the experiment."""
+    """Return what was fixed for an environment id of the experiment."""
     fixed = TypeAdapter(dict[str, str | Honest]).validate_json(_text("honest.json"))[env]
     assert isinstance(fixed, Honest)
     return fixed

@@ -18,9 +18,10 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from envs import make
 from jmorl.display.limits import core
 from jmorl.display.text import objective_label
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.analysis import Finals
 from jmorl.paper.plan import NAMES, SHORTER, Item, Plan
-from jmorl.paper.results import Curves, Records, TargetRow, curves, final_policies, target_rows
+from jmorl.paper.results import Curves, Records, curves, final_policies, target_rows
 from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, legend_below, new_figure, style
 from jmorl.storage.files import written_whole
 from jmorl.units import measured_in
@@ -75,7 +76,7 @@ def _figure(plan: Plan, item: Item, units: str, records: Records) -> Figure | No
 
 
 def curves_figure(rows: Sequence[Curves], item: Item, units: str, title: str) -> Figure:
-    """A panel for each user: mean over seeds, and the range of the seeds shaded."""
+    """Draw a panel for each user: mean over seeds, and the range of the seeds shaded."""
     users = list(dict.fromkeys(row.user for row in rows))
     figure = new_figure(WIDTH, 3.9, title)
     grid = list(figure.subplots(1, len(users), squeeze=False)[0])
@@ -116,14 +117,14 @@ def _focus(axes: Axes, utilities: Sequence[np.ndarray]) -> None:
 
 
 def _note(axes: Axes, text: str, place: Literal["left", "right"] = "right") -> None:
-    """What a picture cuts off, in a lower corner."""
+    """Write in a lower corner what a picture cuts off."""
     x = 0.02 if place == "left" else 0.98
     lifted = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}  # off the lines below
     axes.annotate(text, (x, 0.02), xycoords="axes fraction", ha=place, va="bottom", fontsize=8, color=GREY, bbox=lifted)
 
 
 def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:
-    """A line for each target and method: every seed, their restricted mean and its interval."""
+    """Draw a line for each target and method: every seed, their restricted mean and its interval."""
     figure = new_figure(WIDTH * 0.75, 1.5 + 0.42 * len(rows), title)
     axes = figure.subplots()
     places = _places(rows)
@@ -152,7 +153,7 @@ def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:
 
 
 def stacked(values: Sequence[float]) -> list[float]:  # [S]
-    """How far from the middle of its line each value is drawn, so that equal ones do not hide each other."""
+    """Return how far from its line each value is drawn, so that equal ones do not hide each other."""
     total, seen = Counter(values), Counter[float]()
     heights = []
     for value in values:
@@ -162,13 +163,13 @@ def stacked(values: Sequence[float]) -> list[float]:  # [S]
 
 
 def _places(rows: Sequence[TargetRow]) -> list[float]:
-    """Where each row is drawn: targets apart from each other."""
+    """Return the height at which each row is drawn: targets apart from each other."""
     order = list(dict.fromkeys(row.target for row in rows))
     return [index + 0.5 * order.index(row.target) for index, row in enumerate(rows)]
 
 
 def finals_figure(found: Mapping[str, Finals], item: Item, units: str, title: str) -> Figure:
-    """A panel for each user: where the interactive runs and E-NAUTILUS ended, and the front it started from."""
+    """Draw a panel for each user: where the interactive runs and E-NAUTILUS ended, and the front it started from."""
     figure = new_figure(WIDTH, 4.3, title)
     grid = list(figure.subplots(1, len(found), squeeze=False, sharex=True, sharey=True)[0])
     x, y = measured_in(units, make(item.env).objectives)
@@ -204,6 +205,6 @@ def _key(method: str) -> Line2D:
 
 
 def _panel(user: str, item: Item) -> str:
-    """What a user of the paper wants."""
+    """Return the heading of a user's panel: the name, and what this user of the paper wants."""
     first, second = (objective.label for objective in make(item.env).objectives)
     return {"A": "A: balanced", "B": f"B: focus on {first}", "C": f"C: focus on {second}"}[user]

@@ -1,36 +1,22 @@
 """Parts of the report, as Markdown."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from jmorl.display.text import duration
+from jmorl.experiments.diagnostics import waiting
+from jmorl.experiments.record import RunRecord
+from jmorl.experiments.tables import between, million, number, share, table, vector
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.analysis import ENAUTILUS_ITERATIONS, Finals, seconds_within
 from jmorl.paper.data import PublishedRow, PublishedTable
-from jmorl.paper.drift import common_generation, sigma_at
-from jmorl.paper.mechanism import mechanism, waiting
-from jmorl.paper.naming import million, number, share
-from jmorl.paper.record import RunRecord
-from jmorl.paper.results import Curves, TargetRow
-from jmorl.paper.statistics import Difference, Interval
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def vector(values: Sequence[float] | np.ndarray) -> str:
-    return f"({', '.join(f'{value:.4g}' for value in values)})"
-
-
-def between(found: Interval | Difference) -> str:
-    """A mean of steps and its interval, in millions."""
-    return f"{found.mean / 1e6:.2f} [{found.low / 1e6:.2f}, {found.high / 1e6:.2f}]"
+from jmorl.paper.drift import at_the_start, common_generation, drifted, sigma_at
+from jmorl.paper.results import Curves
 
 
 def published_steps(row: PublishedRow, cap: int) -> str:
-    """Mean and deviation; where the one printed is another, it comes first."""
+    """Write mean and deviation; where the printed deviation is another, it comes first."""
     if row.mean_steps is None or row.std_steps is None:
         return f'≥ {cap / 1e6:.2f} ("No results")'
     if row.std_printed is None:
@@ -39,7 +25,7 @@ def published_steps(row: PublishedRow, cap: int) -> str:
 
 
 def side_by_side(published: PublishedTable, rows: Mapping[str, Sequence[TargetRow]]) -> str:
-    """A published table beside ours, in all units there are: million steps used, and how many runs succeed."""
+    """Lay out a published table beside ours, in all units there are: million steps used, and successes."""
     head = ["target", "method", "published", "reached"]
     head += [cell for units in rows for cell in (f"{units} units", "reached")]
     methods = dict.fromkeys(
@@ -64,25 +50,8 @@ def _ours(row: TargetRow | None, wanted: bool) -> list[str]:
     return [between(row.times.restricted_mean), share(row.times.successes, len(row.seeds))]
 
 
-def seed_by_seed(rows: Sequence[TargetRow]) -> str:
-    """Million steps of every run; what never arrived is marked by ≥, what broke down is said to have."""
-    seeds = list(dict.fromkeys(seed for row in rows for seed in row.seeds))
-    lines = []
-    for row in rows:
-        runs = {seed: _steps(row, index) for index, seed in enumerate(row.seeds)}
-        lines.append([row.target, vector(row.values), row.method, *(runs.get(seed, "missing") for seed in seeds)])
-    return table(["target", "values", "method", *(f"seed {seed}" for seed in seeds)], lines)
-
-
-def _steps(row: TargetRow, index: int) -> str:
-    steps, record = row.times.reached[index], row.records[index]
-    if steps is not None:
-        return f"{steps / 1e6:.2f}"
-    return f"≥ {row.times.budget / 1e6:.2f}" + (f" (broke down at {million(record.total_steps)})" * bool(record.fault))
-
-
 def costs(rows: Sequence[TargetRow], published: PublishedTable) -> str:
-    """What a run takes of a machine, and of a person."""
+    """Lay out the time that a run takes of a machine, and of a person."""
     head = ["target", "method", "time per run", "published", "questions", "before the first question"]
     head += ["between questions"]
     lines = []
@@ -103,12 +72,12 @@ def costs(rows: Sequence[TargetRow], published: PublishedTable) -> str:
 
 
 def _time(seconds: float) -> str:
-    """Empty for NaN, which is not known."""
+    """Write a duration; nothing for NaN, which is not known."""
     return "" if np.isnan(seconds) else duration(seconds)
 
 
 def waits(rows: Sequence[Curves], steps: int) -> str:
-    """What the runs of a figure ask of a person; PGMORL's, which asks at the end, up to the figure's `steps`."""
+    """Lay out what a figure's runs ask of a person; PGMORL asks at the end, here after the figure's `steps`."""
     lines = []
     for row in rows:
         if row.method == "interactive":
@@ -125,7 +94,7 @@ def _waiting_cells(records: Sequence[RunRecord]) -> list[str]:
 
 
 def final_waits(found: Mapping[str, Finals], steps: int) -> str:
-    """The same of final policies: E-NAUTILUS asks when all the runs whose archives it pools have ended."""
+    """Lay out the same for final policies: E-NAUTILUS asks when all the runs whose archives it pools have ended."""
     lines = []
     for user, finals in found.items():
         lines.append([user, "interactive", *_waiting_cells(finals.runs)])
@@ -135,22 +104,23 @@ def final_waits(found: Mapping[str, Finals], steps: int) -> str:
 
 
 def honesty(rows: Sequence[TargetRow]) -> str:
-    """Paper units: what was reached, in raw returns, and how far the units had moved after equally many steps."""
+    """Lay out for paper units the raw returns of successes, and how far units had moved after equally many steps."""
     head = ["target", "method", "raw returns of what reached it, mean", "sigma after the warm-up"]
     head += ["sigma after as many steps in both methods", "reached with generation 0", "owed to moving units"]
     lines = []
     for row in rows:
         runs = [_sigmas(row, rows, seed) for seed in row.seeds]
         first, last = (np.mean([run[when] for run in runs if run], axis=0) for when in (0, 1))
-        raw = vector(row.raw.mean(axis=0)) if len(row.raw) else "never reached"
-        counts = [share(count, row.times.successes) for count in (row.at_the_start, row.drifted)]
+        returns = [record.raw[hit.policy] for record, hit in row.hits]
+        raw = vector(np.mean(returns, axis=0)) if returns else "never reached"
+        counts = [share(count, row.times.successes) for count in (at_the_start(row), drifted(row))]
         sigmas = [vector(first), vector(last)] if any(runs) else ["", ""]
         lines.append([row.target, row.method, raw, *sigmas, *(counts if row.times.successes else ["", ""])])
     return table(head, lines)
 
 
 def _sigmas(row: TargetRow, rows: Sequence[TargetRow], seed: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Of the row's run with a seed: after the warm-up, and when the shorter of all methods' runs ends."""
+    """Return sigma of the row's run with a seed: after the warm-up, and when the shortest of all methods' runs ends."""
     record = row.records[row.seeds.index(seed)]
     peers = [
         other.records[other.seeds.index(seed)] for other in rows if other.target == row.target and seed in other.seeds
@@ -159,21 +129,8 @@ def _sigmas(row: TargetRow, rows: Sequence[TargetRow], seed: int) -> tuple[np.nd
     return (sigma_at(record, 0), sigma_at(record, last)) if last >= 0 else None
 
 
-def mechanisms(rows: Sequence[TargetRow]) -> str:
-    """How the searches got on."""
-    head = ["target", "method", "candidates (median)", "generations with only the choice", "answers that repeat"]
-    head += ["predicted gain", "realised gain"]
-    lines = []
-    for row in rows:
-        found = mechanism(row.records)
-        shares = [number(found.candidates, ".0f"), number(found.alone, ".0%"), number(found.repeated, ".0%")]
-        gains = [number(gain, "+.1%") for gain in (found.predicted_gain, found.realised_gain)]
-        lines.append([row.target, row.method, *shares, *gains])
-    return table(head, lines)
-
-
 def ends(rows: Sequence[Curves]) -> str:
-    """Utilities after the last generation, with every seed; with those of the buffer where there are any."""
+    """Lay out utilities after the last generation, seed by seed, with those of the buffer where there are any."""
     buffers = any(row.buffer is not None for row in rows)
     head = ["user", "method", "mean", "seed by seed"] + ["buffer (authors)", "buffer within bounds (authors)"] * buffers
     lines = []
@@ -189,7 +146,7 @@ def ends(rows: Sequence[Curves]) -> str:
 
 
 def final_table(found: Mapping[str, Finals], weights: Mapping[str, Sequence[float]]) -> str:
-    """Every final policy and its utility; struck through if another final policy dominates it."""
+    """Lay out every final policy and its utility; struck through if another final policy dominates it."""
     lines = []
     for user, finals in found.items():
         w = np.array(weights[user])

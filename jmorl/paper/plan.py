@@ -1,21 +1,23 @@
-"""Which runs the paper's tables and figures are made of, and with which settings.
+"""The plan: the runs that the paper's tables and figures are made of, with their settings.
 
-A cell is one training run. What two items need alike is one cell: PGMORL asks nobody before its end, so its run for a
-seed serves every user and target.
+What two items need alike is one cell: PGMORL asks nobody before its end, so its run for a seed serves every user and
+target.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from jmorl.config import Config, resolve
+from jmorl.config import resolve
 from jmorl.decision.utility import USERS
+from jmorl.experiments.cells import Cell
 from jmorl.paper.data import Targets, honest, published
 
 CAR, CHEETAH = "mo-mountaincarcontinuous-v0", "mo-halfcheetah-v5"
 NAMES = {CAR: "mountaincar", CHEETAH: "halfcheetah"}
 METHODS = ("interactive", "pgmorl")
 SHORTER = "pgmorl-40"  # PGMORL on HalfCheetah with the paper's warm-up, which it has no reason to wait longer for
+METHOD_NAMES = {"interactive": "the interactive method", "pgmorl": "PGMORL", SHORTER: "PGMORL with warm-up 40"}
 TARGET_SEEDS = (1, 7, 10, 42, 100)
 USER_SEEDS = (1, 42, 100)
 PILOT_SEEDS = (2, 3, 5)  # other than all of the above: targets are chosen on them
@@ -70,15 +72,6 @@ ITEMS = {
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One training run. Its key names its file, and no two cells of a plan have the same."""
-
-    key: str
-    config: Config
-    later: bool = False  # made after all others
-
-
-@dataclass(frozen=True)
 class Plan:
     """How the experiment is made: at full size, or `quick`; with which seeds, if not the paper's."""
 
@@ -91,18 +84,18 @@ class Plan:
         return self.seeds or (TARGET_SEEDS if item.kind == "steps to targets" else USER_SEEDS)
 
     def methods(self, item: Item, units: str) -> tuple[str, ...]:
-        """The interactive one first; what comes after is what it is compared with."""
+        """Return the names of an item's methods: the interactive one, then those that it is compared with."""
         shorter = item.env == CHEETAH and units == "raw" and item.kind != "final policies"
         return (*METHODS, SHORTER) if shorter else METHODS
 
     def targets(self, env: str, units: str) -> Targets:
-        """Published in paper units; in raw ones what was fixed beforehand."""
+        """Return the targets: published in paper units, fixed beforehand in raw ones."""
         if units == "paper":
             return next(table.targets for table in published().tables.values() if table.env == env)
         return QUICK_TARGETS if self.quick else honest(env).targets
 
     def user_weights(self, item: Item, units: str) -> dict[str, tuple[float, ...]]:
-        """Each user's weights of the objectives. Normalised utilities are linear, too, with other weights.
+        """Return each user's weights of the objectives. Normalised utilities are linear, too, with other weights.
 
         In paper units normalising divides all objectives by the same constant, which changes no decision.
         """
@@ -110,28 +103,34 @@ class Plan:
         return {user: weights if span is None else _normalised(weights, span) for user, weights in USERS.items()}
 
     def cells(self, item: Item, units: str) -> list[Cell]:
-        """The runs that an item needs."""
+        """Return the runs that an item needs."""
         goals = self._goals(item, units)
         seeds = self.seeds_of(item)
         cells = [self.interactive(item, units, goal, seed) for goal in goals for seed in seeds]
         baselines = self.methods(item, units)[1:]
         return cells + [self.pgmorl(item, units, seed, method) for method in baselines for seed in seeds]
 
+    def later(self, item: Item, units: str) -> list[Cell]:
+        """Return those of an item's runs that are made after the other runs of all items."""
+        if SHORTER not in self.methods(item, units):
+            return []
+        return [self.pgmorl(item, units, seed, SHORTER) for seed in self.seeds_of(item)]
+
     def cell(self, item: Item, units: str, method: str, goal: str, seed: int) -> Cell:
-        """The run of a method for a user or target."""
+        """Return the run of a method for a user or target."""
         if method == "interactive":
             return self.interactive(item, units, goal, seed)
         return self.pgmorl(item, units, seed, method)
 
     def interactive(self, item: Item, units: str, goal: str, seed: int) -> Cell:
-        """The run for a user, or for a target."""
+        """Return the interactive run for a user, or for a target."""
         to_target = item.kind == "steps to targets"
         user = self._goals(item, units)[goal]
         name = "target" if to_target else "user" if user == goal else "normalised"
         return self._cell(item.env, units, "interactive", user, f"{name}-{goal}", seed, to_target)
 
     def pgmorl(self, item: Item, units: str, seed: int, method: str = "pgmorl") -> Cell:
-        """The run for all users and targets; `method` may be SHORTER.
+        """Return PGMORL's run for all users and targets; `method` may be SHORTER.
 
         With a constant learning rate a run is the beginning of a longer one, so that the longest serves for all; a
         rate that falls over the budget makes them different runs.
@@ -143,11 +142,11 @@ class Plan:
         return self._cell(item.env, units, method, "A", "to-budget", seed, to_cap=False)
 
     def steps(self, item: Item) -> int:
-        """The budget after which an item looks at a run."""
+        """Return the budget after which an item looks at a run."""
         return self._steps(item.env, item.kind == "steps to targets")
 
     def pilots(self, env: str) -> list[Cell]:
-        """Runs of both methods on other seeds, in raw units, on which targets are chosen."""
+        """Return runs of both methods on other seeds, in raw units, on which targets are chosen."""
         item = next(item for item in ITEMS.values() if item.env == env and item.kind == "greatest utility")
         seeds = self.seeds or (QUICK_SEEDS if self.quick else PILOT_SEEDS)
         return [self.interactive(item, "raw", goal, seed) for goal in USERS for seed in seeds] + [
@@ -155,7 +154,7 @@ class Plan:
         ]
 
     def _goals(self, item: Item, units: str) -> dict[str, str]:
-        """Name -> decision maker, as a config has it."""
+        """Return the decision maker, as a config has it, of each user or target by name."""
         if item.kind == "steps to targets":
             unscaled = ",unscaled" if units == "paper" else ""
             targets = self.targets(item.env, units).items()
@@ -180,23 +179,23 @@ class Plan:
         if method == SHORTER:
             config = config.replace(population={"warmup_iterations": SHORTER_WARM_UP[self.quick]})
         key = f"{NAMES[env]}-{units}-{method}-{goal}-seed-{seed}"
-        return Cell(key, config.replace(steps=self._steps(env, to_cap)), method == SHORTER)
+        return Cell(key, config.replace(steps=self._steps(env, to_cap)))
 
 
-def distinct(cells: Iterable[Cell]) -> list[Cell]:
-    """Each cell once, in order."""
-    return list({cell.key: cell for cell in cells}.values())
+def named(method: str) -> str:
+    """Return the name of a method in a sentence."""
+    return METHOD_NAMES[method]
 
 
 def in_order(items: Sequence[Item], units: Sequence[str]) -> Iterator[tuple[Item, str]]:
-    """Raw units first, and of them the car, which is quickest; then the rest."""
+    """Yield every item in each kind of units, in the order in which their runs are made."""
     for unit in units:
         for item in items:
             yield item, unit
 
 
 def _normalised(weights: Sequence[float], span: Sequence[float]) -> tuple[float, ...]:
-    """The weights of w . (z / span), summing to one."""
+    """Return the weights of w . (z / span), summing to one."""
     divided = [weight / each for weight, each in zip(weights, span, strict=True)]
     return tuple(round(each / sum(divided), 6) for each in divided)
 

@@ -4,13 +4,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from jmorl.experiments import tables
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper import claims, markdown
-from jmorl.paper.acceptance import drift_told, explanations, raw_bar
+from jmorl.paper.acceptance import ACCEPTANCE_CRITERION, acceptance_verdict, drift_told, explanations
 from jmorl.paper.data import PublishedTable, honest, published
 from jmorl.paper.figures import draw
 from jmorl.paper.introduction import DEVIATIONS, DIFFERENT_UNITS, INTRODUCTION, MEAN_UTILITY, POOLED, SWAPPED
 from jmorl.paper.plan import ITEMS, NAMES, Item, Plan
-from jmorl.paper.results import Records, TargetRow, curves, final_policies, target_rows
+from jmorl.paper.results import Records, curves, final_policies, target_rows
 from jmorl.paper.state import state
 from jmorl.paper.verdicts import MISSING, table_verdict, target_verdict
 from jmorl.storage.files import write_text
@@ -21,9 +23,6 @@ TITLES = {
     "mean utility": "mean utility of the policies just trained",
     "final policies": "final policies, interactive and by E-NAUTILUS",
 }
-
-
-BAR = "The bar: as many successes as PGMORL and as the best published row, for B and C in fewer steps."
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ def _finals_part(plan: Plan, item: Item, units: str, records: Records) -> list[s
 
 
 def _table_section(table: PublishedTable, item: Item, rows: Mapping[str, Sequence[TargetRow]]) -> list[str]:
-    """A table of steps to targets: side by side, verdicts, and in each kind of units what is behind them."""
+    """Write up a table of steps to targets: side by side, verdicts, and in each kind of units what is behind them."""
     parts = [markdown.side_by_side(table, rows), DEVIATIONS]
     parts.append(SWAPPED if any(row.std_printed for row in table.rows) else "")
     for units, each in rows.items():
@@ -104,17 +103,15 @@ def _table_section(table: PublishedTable, item: Item, rows: Mapping[str, Sequenc
         parts.append(f"### In {units} units\n\n{table_verdict(table, by_target)}")
         parts.append(_listed(target_verdict(table, some) for some in by_target.values()))
         if units == "raw":
-            parts.append(
-                "The bar: as many successes as PGMORL and as the best published row, for B and C in fewer steps."
-            )
-            parts.append(_listed(raw_bar(table, some) for some in by_target.values()))
+            parts.append(ACCEPTANCE_CRITERION)
+            parts.append(_listed(acceptance_verdict(table, some) for some in by_target.values()))
             parts.append(f"The targets: {honest(item.env).targets_reason}")
         else:
             parts.append(_listed(drift_told(row) for row in each if row.times.successes))
             parts.append(_explained(table, by_target))
-        parts += [markdown.seed_by_seed(each), markdown.costs(each, table)]
+        parts += [tables.seed_by_seed(each), markdown.costs(each, table)]
         parts.append(markdown.honesty(each) if units == "paper" else "")
-        parts += ["What the searches were doing:", markdown.mechanisms(each)]
+        parts += ["What the searches were doing:", tables.mechanisms(each)]
     return parts if rows else [*parts, MISSING]
 
 

@@ -5,91 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jmorl.paper.analysis import Finals, Reached, buffer_utility, finals, greatest_utility, offspring_utility, reached
-from jmorl.paper.drift import reached_without_drift
+from jmorl.experiments.record import RunRecord
+from jmorl.experiments.statistics import Difference, difference
+from jmorl.experiments.targets import TargetRow, compared, target_row
+from jmorl.paper.analysis import Finals, buffer_utility, finals, greatest_utility, offspring_utility
 from jmorl.paper.plan import METHODS, Item, Plan
-from jmorl.paper.record import RunRecord
-from jmorl.paper.statistics import Difference, Times, difference, saved
 
 Records = Mapping[str, RunRecord]  # by the cell's key
-
-
-@dataclass(frozen=True)
-class TargetRow:
-    """One method on its way to one target."""
-
-    target: str
-    values: tuple[float, ...]  # [M] the target
-    method: str
-    seeds: tuple[int, ...]  # [S] those there are
-    records: tuple[RunRecord, ...]  # [S]
-    found: tuple[Reached | None, ...]  # [S]
-    times: Times
-
-    @property
-    def raw(self) -> np.ndarray:  # [successes, M]
-        """The mean undiscounted returns of the policies that reached the target."""
-        hits = [record.raw[hit.policy] for record, hit in zip(self.records, self.found, strict=True) if hit]
-        return np.array(hits).reshape(-1, len(self.values))
-
-    @property
-    def seconds(self) -> float:
-        """Mean time until the target was reached, or the budget used up; compilation not counted."""
-        runs = zip(self.records, self.found, strict=True)
-        return float(np.mean([hit.seconds if hit else record.total_seconds for record, hit in runs]))
-
-    @property
-    def drifted(self) -> int:
-        """How many successes no trained policy had in the units after the warm-up; all of untrained ones are."""
-        return sum(1 for hit in self.found if hit and not hit.without_drift)
-
-    @property
-    def at_the_start(self) -> int:
-        """How many successes come with generation 0, before anything was asked or selected."""
-        return sum(1 for hit in self.found if hit and hit.generation == 0)
-
-    @property
-    def untrained(self) -> int:
-        """How many successes are of policies that were never trained."""
-        return sum(1 for hit in self.found if hit and hit.untrained)
-
-    @property
-    def prevented(self) -> int:
-        """How many runs that never arrived have a trained policy that would do in the units after the warm-up."""
-        return sum(reached_without_drift(record, self.values, len(record.generations)) for record in self.late)
-
-    @property
-    def late(self) -> list[RunRecord]:
-        """The runs that did not reach the target, without those that broke down before there was anything."""
-        runs = zip(self.records, self.found, strict=True)
-        return [record for record, hit in runs if hit is None and record.generations]
-
-    @property
-    def faults(self) -> int:
-        """How many runs broke down."""
-        return sum(record.fault is not None for record in self.records)
-
-
-def target_row(
-    target: str, values: Sequence[float], method: str, seeds: Sequence[int], records: Sequence[RunRecord], cap: int
-) -> TargetRow:
-    """A row of at least one run. A last generation is a whole one; what it finds after `cap` steps is too late."""
-    found = tuple(reached(record, values, cap) for record in records)
-    times = Times(tuple(hit.steps if hit else None for hit in found), cap)
-    return TargetRow(target, tuple(values), method, tuple(seeds), tuple(records), found, times)
-
-
-def compared(one: TargetRow, other: TargetRow) -> Difference | None:
-    """Steps that the first saves against the second on the seeds that both have; None if there is none."""
-    common = [seed for seed in one.seeds if seed in other.seeds]
-    if not common:
-        return None
-    pair = (_on(row, common) for row in (one, other))
-    return saved(*pair)
-
-
-def _on(row: TargetRow, seeds: Sequence[int]) -> Times:
-    return Times(tuple(row.times.reached[row.seeds.index(seed)] for seed in seeds), row.times.budget)
 
 
 @dataclass(frozen=True)
@@ -107,7 +29,7 @@ class Pair:
 
 
 def pair_of(rows: Sequence[TargetRow]) -> Pair | None:
-    """Of the rows of one target; None if runs of one of the methods are missing.
+    """Return the pair of one target's rows; None if runs of one of the methods are missing.
 
     Better is what reaches the target more often, then with fewer steps.
     """
@@ -122,7 +44,7 @@ def pair_of(rows: Sequence[TargetRow]) -> Pair | None:
 
 
 def target_rows(plan: Plan, item: Item, units: str, records: Records) -> list[TargetRow]:
-    """A row for each target and method that has a run."""
+    """Return a row for each target and method that has a run."""
     rows = []
     for name, values in plan.targets(item.env, units).items():
         for method in plan.methods(item, units):
@@ -133,7 +55,7 @@ def target_rows(plan: Plan, item: Item, units: str, records: Records) -> list[Ta
 
 
 def _there(plan: Plan, item: Item, units: str, method: str, goal: str, records: Records) -> dict[int, RunRecord]:
-    """The runs there are, by seed."""
+    """Return the runs there are, by seed."""
     keys = {seed: plan.cell(item, units, method, goal, seed).key for seed in plan.seeds_of(item)}
     return {seed: records[key] for seed, key in keys.items() if key in records}
 
@@ -162,7 +84,7 @@ class Curves:
 
 
 def curves(plan: Plan, item: Item, units: str, records: Records) -> list[Curves]:
-    """For each user and method that has a run."""
+    """Return the curves of each user and method that has a run."""
     found = []
     for user, weights in plan.user_weights(item, units).items():
         for method in plan.methods(item, units):
@@ -188,7 +110,7 @@ def _curves(
 
 
 def advantage(one: Curves, other: Curves) -> Difference | None:
-    """How much more the first has at the end, on the seeds that both have; None if there is none."""
+    """Return how much more the first has at the end, on the seeds of both; None if they share no seed."""
     pairs = [
         one.last[one.seeds.index(seed)] - other.last[other.seeds.index(seed)]
         for seed in one.seeds
@@ -198,7 +120,7 @@ def advantage(one: Curves, other: Curves) -> Difference | None:
 
 
 def curve_pairs(rows: Sequence[Curves]) -> Iterator[tuple[Curves, Curves, Difference]]:
-    """For each user with runs of both: the interactive method, the row of PGMORL that ends highest, the advantage."""
+    """Yield for each user with runs of both the interactive method, PGMORL's highest-ending row, and the advantage."""
     for user in dict.fromkeys(row.user for row in rows):
         ours = [row for row in rows if row.user == user and row.method == "interactive"]
         theirs = [row for row in rows if row.user == user and row.method != "interactive"]
@@ -210,7 +132,7 @@ def curve_pairs(rows: Sequence[Curves]) -> Iterator[tuple[Curves, Curves, Differ
 
 
 def final_policies(plan: Plan, item: Item, units: str, records: Records) -> dict[str, Finals]:
-    """For each user for whom both methods have all their runs: pooling is over all seeds."""
+    """Return the final policies of each user for whom both methods have all their runs: pooling is over all seeds."""
     found = {}
     seeds = plan.seeds_of(item)
     for user, weights in plan.user_weights(item, units).items():

@@ -3,10 +3,12 @@
 from collections.abc import Iterator, Sequence
 
 from jmorl.display.text import duration, short_count
+from jmorl.experiments import tables
+from jmorl.experiments.cells import Cell, distinct
+from jmorl.experiments.record import RunRecord
 from jmorl.paper import markdown
 from jmorl.paper.data import published
-from jmorl.paper.plan import ITEMS, NAMES, Cell, Item, Plan, distinct, in_order
-from jmorl.paper.record import RunRecord
+from jmorl.paper.plan import ITEMS, NAMES, Item, Plan, in_order
 from jmorl.paper.results import Records
 
 Wanted = Sequence[tuple[Item, str, Sequence[Cell]]]
@@ -14,7 +16,7 @@ NO_COMMIT = "no commit"
 
 
 def state(plan: Plan, items: Sequence[Item], units: Sequence[str], records: Records) -> str:
-    """As Markdown."""
+    """Write up what a report rests on."""
     wanted = [(item, each, plan.cells(item, each)) for item, each in in_order(items, units)]
     there = [records[cell.key] for cell in _distinct(wanted) if cell.key in records]
     devices = ", ".join(sorted({run.device for run in there}))
@@ -22,7 +24,7 @@ def state(plan: Plan, items: Sequence[Item], units: Sequence[str], records: Reco
     parts = [
         f"It rests on {total}" + (f" on {devices}." if devices else "."),
         _commits(there),
-        markdown.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)),
+        tables.table(["part", "units", "runs", "steps", "time"], _parts(wanted, records)),
         _beside_the_papers(wanted, records),
         _waits(there),
         "\n".join([*_missing(wanted, records), *_broken(wanted, records)]),
@@ -39,7 +41,7 @@ def _steps(runs: Sequence[RunRecord]) -> int:
 
 
 def _seconds(runs: Sequence[RunRecord]) -> float:
-    """How long the machine was busy. Runs made together begin together, so the longest has the time of them all."""
+    """Return how long the machine was busy. Runs made together begin together: the longest has the time of all."""
     alone = sum(run.machine_seconds for run in runs if not run.together)
     longest: dict[tuple[str, ...], float] = {}
     for run in runs:
@@ -49,7 +51,7 @@ def _seconds(runs: Sequence[RunRecord]) -> float:
 
 
 def _commits(runs: Sequence[RunRecord]) -> str:
-    """Of which code the records are."""
+    """Name the commits of the code that made the records."""
     known = [(run.commit or NO_COMMIT)[:12] for run in runs]
     counts = {commit: known.count(commit) for commit in sorted(set(known))}
     if not counts:
@@ -71,7 +73,7 @@ def _waits(runs: Sequence[RunRecord]) -> str:
 
 
 def _parts(wanted: Wanted, records: Records) -> Iterator[list[str]]:
-    """What each part took. A run that several need counts for the first of them, and what is left may be nothing."""
+    """Yield what each part took. A run that several need counts for the first of them."""
     counted: set[str] = set()
     for item, units, cells in wanted:
         there = [records[cell.key] for cell in cells if cell.key in records and cell.key not in counted]
@@ -80,7 +82,7 @@ def _parts(wanted: Wanted, records: Records) -> Iterator[list[str]]:
 
 
 def _beside_the_papers(wanted: Wanted, records: Records) -> str:
-    """The time of each environment's runs, and of its table's beside the published."""
+    """Lay out the time of each environment's runs, and of its table's beside the published."""
     lines = []
     for env, units in dict.fromkeys((item.env, units) for item, units, _ in wanted):
         every = distinct(c for item, each, some in wanted if (item.env, each) == (env, units) for c in some)
@@ -93,7 +95,7 @@ def _beside_the_papers(wanted: Wanted, records: Records) -> str:
         "All runs of an environment, those of its table, and the paper's time for that table: the time per run of each "
         "row times its five runs. One run of PGMORL serves all targets here."
     )
-    return f"{text}\n\n{markdown.table(['environment', 'units', 'all runs', 'table', 'table in the paper'], lines)}"
+    return f"{text}\n\n{tables.table(['environment', 'units', 'all runs', 'table', 'table in the paper'], lines)}"
 
 
 def _missing(wanted: Wanted, records: Records) -> Iterator[str]:
@@ -104,7 +106,7 @@ def _missing(wanted: Wanted, records: Records) -> Iterator[str]:
 
 
 def _named(keys: Sequence[str]) -> str:
-    """Keys of cells, seeds of the same kind together."""
+    """Write the keys of cells, with the seeds of the same kind together."""
     seeds: dict[str, list[str]] = {}
     for key in keys:
         kind, _, seed = key.rpartition("-seed-")

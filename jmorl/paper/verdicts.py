@@ -3,34 +3,36 @@
 from collections.abc import Mapping, Sequence
 
 from jmorl.config import Config
+from jmorl.experiments.diagnostics import Mechanism, mechanism
+from jmorl.experiments.statistics import Difference
+from jmorl.experiments.tables import million, number, share
+from jmorl.experiments.targets import TargetRow
 from jmorl.paper.data import PublishedTable
-from jmorl.paper.mechanism import Mechanism, mechanism
-from jmorl.paper.naming import million, named, number, share
-from jmorl.paper.results import Pair, TargetRow, pair_of
-from jmorl.paper.statistics import Difference
+from jmorl.paper.plan import named
+from jmorl.paper.results import Pair, pair_of
 
 MISSING = "Not to be judged yet: runs are missing."
 METHODS = ("interactive", "pgmorl")  # those published
 
 
 def ahead(difference: float, resolution: float) -> str:
-    """Who is ahead, if `difference` is what the interactive method gains; neither within the resolution."""
+    """Name who is ahead, if `difference` is what the interactive method gains; neither within the resolution."""
     return "comparable" if abs(difference) < resolution else "interactive" if difference > 0 else "pgmorl"
 
 
 def published_order(published: PublishedTable, target: str) -> str:
-    """Which method needs fewer steps in the paper."""
+    """Name the method that needs fewer steps in the paper."""
     return ahead(published.mean_steps(target, "pgmorl") - published.mean_steps(target, "interactive"), 0.0)
 
 
 def order(pair: Pair) -> str:
-    """Which method needs fewer steps here; half a generation cannot be told apart."""
+    """Name the method that needs fewer steps here; half a generation cannot be told apart."""
     config = Config.model_validate(pair.interactive.records[0].config)
     return ahead(pair.difference.mean, config.population.iterations * config.steps_per_iteration / 2)
 
 
 def target_verdict(published: PublishedTable, rows: Sequence[TargetRow]) -> str:
-    """One target: who needs fewer steps in the paper, and who does here."""
+    """Judge one target: which method needs fewer steps in the paper, and which does here."""
     target, pair = rows[0].target, pair_of(rows)
     if pair is None:
         return f"Target {target}: not to be compared yet, as runs of one method are missing."
@@ -69,7 +71,7 @@ def steps_saved(difference: Difference) -> str:
 
 
 def stuck(found: Mechanism) -> str:
-    """What a search does, as a clause."""
+    """Write how a search gets on, as a clause."""
     parts = [
         f"policies that can be continued number {number(found.candidates, '.0f', '0')} (median)",
         f"{number(found.alone, '.0%', 'none')} of the generations have nothing but the choice itself to continue",
@@ -83,14 +85,14 @@ def stuck(found: Mechanism) -> str:
 
 
 def shown(rows: Sequence[TargetRow]) -> str:
-    """The mechanism behind a row: of the runs that never arrived, or else of all."""
+    """Write the mechanism behind a row: of the runs that never arrived, or else of all."""
     late = [record for row in rows for record in row.late]
     which = "in its runs that never arrive" if late else "in its runs"
     return f"{which}, {stuck(mechanism(late or [record for row in rows for record in row.records]))}"
 
 
 def table_verdict(published: PublishedTable, rows: Mapping[str, Sequence[TargetRow]]) -> str:
-    """A whole table: for how many targets the order of the methods is the published one, and clearly so."""
+    """Judge a whole table: for how many targets the order of the methods is the published one, and clearly so."""
     pairs = {target: pair for target, some in rows.items() if (pair := pair_of(some))}
     if not pairs:
         return MISSING
@@ -118,7 +120,7 @@ def _reach(method: str, rows: Mapping[str, Sequence[TargetRow]]) -> str:
 
 
 def against_published(published: PublishedTable, row: TargetRow) -> str:
-    """How many steps a method uses beside the published ones, as a clause."""
+    """Write how many steps a method uses beside the published ones, as a clause."""
     difference = row.times.restricted_mean.mean - published.mean_steps(row.target, row.method)
     return f"it uses {million(abs(difference))} steps " + (
         "more than published" if difference > 0 else "fewer than published"

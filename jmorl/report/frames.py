@@ -33,7 +33,7 @@ POSES = 8
 
 
 def film_frame(recording: Recording, step: int, width: int) -> Image.Image:
-    """The picture after so many steps, `width` pixels wide; its height is even, as films want it."""
+    """Return the picture after so many steps, `width` pixels wide; its height is even, as films want it."""
     environment, size = recording.environment, width / 42
     columns = min(len(environment.objectives), MOST_COLUMNS)
     rows = ceil(len(environment.objectives) / columns)
@@ -72,7 +72,7 @@ def strip(recording: Recording, width: int) -> Image.Image:
 
 
 def draw_scene(scene: Scene, width: int, size: float) -> Image.Image:
-    """A scene `width` pixels wide, with labels of `size` pixels."""
+    """Return a scene `width` pixels wide, with labels of `size` pixels."""
     (left, right), (bottom, top) = scene.window.x, scene.window.z
     scale = width / (right - left)
     height = round(scale * (top - bottom))
@@ -113,7 +113,7 @@ class _Canvas:
         return [(self.scale * (x - left), self.scale * (top - z)) for x, z in points]
 
     def _rounded(self, start: Point, end: Point, radius: float, colour: str) -> None:
-        """A capsule with a white edge, to set it off from what is below."""
+        """Return a capsule with a white edge, to set it off from what is below."""
         pixels, inner = np.array(self._pixels([start, end])), radius * self.scale
         along = pixels[1] - pixels[0]
         across = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-9)
@@ -150,12 +150,12 @@ def _time(recording: Recording, step: int) -> str:
 
 
 def _totals(recording: Recording, step: int) -> list[str]:
-    """The objectives so far, in the same format throughout the episode, and never -0."""
+    """Return the objectives so far, in the same format throughout the episode, and never -0."""
     return [f"{column[step]:z{number_format(column)}}" for column in recording.totals.T]
 
 
 @cache
 def _font(size: float, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """The plots' font, which comes with matplotlib."""
+    """Return the plots' font, which comes with matplotlib."""
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, round(size))

@@ -82,7 +82,7 @@ def draw_policies(axes: Axes, run: StoredRun, pair: list[int], limits: np.ndarra
 
 
 def choices_of(run: StoredRun) -> list[tuple[str, np.ndarray]]:
-    """The policies that steered the search, each once: the generations it was chosen for, and its values [M]."""
+    """Return the policies that steered the search, each once: the generations it was chosen for, and its values [M]."""
     asked: dict[int, tuple[list[int], np.ndarray]] = {}
     for record in run.decisions:
         if isinstance(record, DecisionRecord) and record.purpose == "steer":
@@ -110,12 +110,12 @@ def note_outside(axes: Axes, values: np.ndarray, limits: np.ndarray) -> None:
 
 
 def front_name(run: StoredRun) -> str:
-    """What the last known front is called."""
+    """Return what the last known front is called."""
     return "final front" if run.result else "front so far"
 
 
 def legend_of(run: StoredRun, choice: str, without: Container[str] = ()) -> list[Artist]:
-    """An entry for each kind of thing there is in a run, but for those `without`; a choice is called `choice`."""
+    """Return an entry for each kind of thing in a run, but for those `without`; a choice is called `choice`."""
     last = len(run.bounds) - 1
     early, late = generation_colour(0, last), generation_colour(last, last)
     entries: dict[str, Artist] = {"policy": Line2D([], [], marker="o", color=PALE, ms=4, ls="", label="policy")}
@@ -134,14 +134,14 @@ def legend_of(run: StoredRun, choice: str, without: Container[str] = ()) -> list
 
 
 def _close(run: StoredRun) -> np.ndarray:
-    """What a view of the last front must show: its core, the last bounds and the chosen policy, [N, M]."""
+    """Return what a view of the last front must show: its core, the last bounds and the chosen policy, [N, M]."""
     front, bounds = values_of(run.front), run.bounds[-1:]
     chosen = [run.chosen.values[None]] if run.chosen else []
     return np.concatenate([front[core(front)], bounds[np.isfinite(bounds).all(axis=1)], *chosen])
 
 
 def _draw_fronts(axes: Axes, run: StoredRun, limits: np.ndarray) -> None:
-    """The edge of what was dominated after each generation."""
+    """Return the edge of what was dominated after each generation."""
     values = values_of(run.policies)
     generations = np.array([policy.generation for policy in run.policies])
     last = len(run.bounds) - 1
@@ -152,7 +152,7 @@ def _draw_fronts(axes: Axes, run: StoredRun, limits: np.ndarray) -> None:
 
 
 def _staircase(axes: Axes, front: np.ndarray, limits: np.ndarray, colour: tuple[float, ...], width: float) -> None:
-    """The edge of what the front [N, 2] dominates, out to the limits [2, 2]."""
+    """Return the edge of what the front [N, 2] dominates, out to the limits [2, 2]."""
     front = front[np.argsort(front[:, 0])]
     left, bottom = np.minimum(limits[0], front.min(axis=0))
     x = np.concatenate([[left], front[:, 0], front[-1:, 0]])
@@ -161,7 +161,7 @@ def _staircase(axes: Axes, front: np.ndarray, limits: np.ndarray, colour: tuple[
 
 
 def _draw_bounds(axes: Axes, bounds: np.ndarray, limits: np.ndarray) -> None:
-    """A corner for each of the bounds [G, 2] but the last."""
+    """Return a corner for each of the bounds [G, 2] but the last."""
     right, top = limits[1]
     for x, y in np.unique(bounds[:-1], axis=0):
         if np.isfinite([x, y]).all():
@@ -177,7 +177,7 @@ def _frame_close_up(whole: Axes, close: Axes, limits: np.ndarray) -> None:
 
 
 def _label_choices(axes: Axes, run: StoredRun, limits: np.ndarray, hidden: np.ndarray | None) -> None:
-    """The generation at each choice within the limits [2, 2], but none within those that another view shows."""
+    """Return the generation at each choice within the limits [2, 2], but none within those that another view shows."""
     choices = choices_of(run)
     shown = [
         (text, values)

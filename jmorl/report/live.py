@@ -127,16 +127,17 @@ class LiveView(Watcher):
         else:
             yield from _remaining(timeline, now)
         if timeline.finished:
-            front, utility = timeline.finished.front, timeline.finished.utility
+            front, best = timeline.finished.front, timeline.finished.utility_max
+            mean = timeline.finished.search.get("utility_mean")
             yield "speed", f"{short_count(timeline.finished.steps_per_second)} steps/s"
             yield "front", f"{plural(front.front_size, 'policy')}, hypervolume {number(front.hypervolume)}"
-            if utility.utility_max is not None and utility.utility_mean is not None:
-                yield "utility", f"best {number(utility.utility_max)}, mean {number(utility.utility_mean)}"
-        if timeline.decided:
-            decided = timeline.decided
+            if best is not None:
+                yield "utility", f"best {number(best)}" + ("" if mean is None else f", mean {number(mean)}")
+        if timeline.decided and timeline.decided.chosen:
+            decided, choice = timeline.decided, timeline.decided.chosen
             formats = [number_format(column) for column in decided.question.values.T]
-            values = values_in_words(decided.chosen.values, self.objectives, formats)
-            yield "chosen" if timeline.result else "last choice", f"policy {decided.chosen.id}: {values}"
+            values = values_in_words(choice.values, self.objectives, formats)
+            yield "chosen" if timeline.result else "last choice", f"policy {choice.id}: {values}"
             if np.isfinite(decided.bounds).any():
                 yield "bounds", values_in_words(decided.bounds, self.objectives, formats, "≥ ")
         if timeline.finished and timeline.finished.candidates == 1 and timeline.decided:

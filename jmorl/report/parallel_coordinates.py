@@ -85,7 +85,7 @@ def _heights(values: np.ndarray, limits: np.ndarray) -> np.ndarray:
 
 
 def _draw_scale(axes: Axes, index: int, limits: np.ndarray) -> None:
-    """The axis of an objective with its ticks, in raw units, between the limits [2]."""
+    """Return the axis of an objective with its ticks, in raw units, between the limits [2]."""
     axes.axvline(index, color=INK, linewidth=0.9, zorder=2)
     low, high = limits
     ticks = MaxNLocator(6).tick_values(low, high)

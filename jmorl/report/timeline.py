@@ -5,7 +5,6 @@ from typing import Literal
 
 from jmorl.config import Config
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
-from jmorl.state import RunState
 
 Phase = Literal["compiling", "warm-up", "generation", "question", "finished"]
 
@@ -18,7 +17,7 @@ class Timeline:
     since: float  # when the phase began
     phase: Phase = "compiling"
     generation: int = 0  # that is going on, or that a question is about
-    silent: int = 0  # generations before the next question, the one that is going on included
+    silent: int | None = 0  # generations before the next question, the one that is going on included; None: never
     compiled: Compiled | None = None
     decided: Decided | None = None  # the last answer
     resumed: Resumed | None = None  # where the run was taken up
@@ -43,18 +42,19 @@ class Timeline:
         return warmup + self.generations * self.generation_steps
 
     def after(self, event: Event, now: float) -> "Timeline":
-        """The timeline when `event` has just happened."""
+        """Return the timeline when `event` has just happened."""
         match event:
             case Compiled():
                 return replace(self, phase="warm-up", since=now, compiled=event)
             case Resumed():
-                return replace(self._next(event.state), since=now, resumed=event)
+                return replace(self._next(event), since=now, resumed=event)
             case GenerationFinished():
-                return replace(self._next(event.state), since=now, finished=event)
+                return replace(self._next(event), since=now, finished=event)
             case Decided():
-                goes_on = event.question.purpose == "steer" and not event.answer.stop
+                silent = event.generations_to_question
+                goes_on = silent != 0 and event.question.purpose != "final" and not event.question.stops(event.answer)
                 phase: Phase = "generation" if goes_on else "question"
-                return replace(self, phase=phase, since=now, silent=event.answer.generations, decided=event)
+                return replace(self, phase=phase, since=now, silent=silent, decided=event)
             case RunFinished():
                 return replace(self, phase="finished", since=now, result=event)
 
@@ -77,7 +77,7 @@ class Timeline:
 
     def seconds_to_question(self, now: float) -> float | None:
         """How long until the decision maker is asked; None if that is not known or not to come."""
-        if self.phase != "generation" or self.config.method != "interactive":
+        if self.phase != "generation" or self.silent is None:
             return None
         return self._seconds(now, min(self.silent - 1, self.generations - self.generation))
 
@@ -87,16 +87,15 @@ class Timeline:
         return self._seconds(now, left if self.phase == "generation" else left + 1)
 
     def _seconds(self, now: float, generations: int) -> float | None:
-        """What is left of the generation that is going on, and so many more."""
+        """Return what is left of the generation that is going on, and so many more."""
         each = self.generation_seconds()
         if each is None:
             return None
         running = max(each - (now - self.since), 0.0) if self.phase == "generation" else 0.0
         return running + generations * each
 
-    def _next(self, state: RunState) -> "Timeline":
-        """What follows on a generation that ended with this state."""
-        generation, silent = state.generation + 1, state.silent_generations
-        asks = self.config.method == "interactive" and not silent
-        phase: Phase = "question" if asks or generation > self.generations else "generation"
+    def _next(self, event: GenerationFinished | Resumed) -> "Timeline":
+        """Return what follows on a generation that ended."""
+        generation, silent = event.state.generation + 1, event.generations_to_question
+        phase: Phase = "question" if silent == 0 or generation > self.generations else "generation"
         return replace(self, phase=phase, generation=generation, silent=silent)

@@ -84,8 +84,8 @@ class Lines(Watcher):
         ]
         if event.candidates == 1 and event.state.choice:
             facts.append("nothing but the choice itself within the bounds")
-        if event.utility.utility_max is not None:
-            facts.append(f"best utility {number(event.utility.utility_max)}")
+        if event.utility_max is not None:
+            facts.append(f"best utility {number(event.utility_max)}")
         times = f"train {duration(seconds.train)}, evaluate {duration(seconds.evaluate)}"
         if generation:
             times = f"select {duration(seconds.select)}, {times}"
@@ -108,7 +108,8 @@ class Json(Watcher):
          "front_size", "hypervolume", "expected_utility", "sparsity", "utility_max", "utility_mean",
          "utility_mean_within_bounds", "prediction_error", "realized_change", "front": [policy, ...]}
         {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
-         "bounds": that follow, "shown": how many policies, "stop", "generations": before the next question, "seconds"}
+         "bounds": that follow, "shown": how many policies, the fields of the answer ("stop", "generations": before the
+         next question), "seconds"}
         {"event": "finished", "reason": "budget", "satisfied" or "stopped", "chosen": policy}
 
     A policy is {"policy": its id, "generation", "parent", "weights", "values", "std"}.
@@ -131,20 +132,23 @@ class Json(Watcher):
             case GenerationFinished():
                 return self._generation_fields(event)
             case Decided():
-                return {
-                    "event": "decided",
-                    "purpose": event.question.purpose,
-                    "generation": event.question.generation,
-                    "policy": event.chosen.id,
-                    "values": event.chosen.values.tolist(),
-                    "bounds": event.bounds.tolist(),
-                    "shown": len(event.question.front),
-                    "stop": event.answer.stop,
-                    "generations": event.answer.generations,
-                    "seconds": event.seconds,
-                }
+                return self._decided_fields(event)
             case RunFinished():
                 return {"event": "finished", "reason": event.reason, "chosen": _policy_fields(event.chosen)}
+
+    def _decided_fields(self, event: Decided) -> dict[str, Any]:
+        question, chosen = event.question, event.chosen
+        return {
+            "event": "decided",
+            "purpose": question.purpose,
+            "generation": question.generation,
+            "policy": chosen.id if chosen else None,
+            "values": chosen.values.tolist() if chosen else None,
+            "bounds": event.bounds.tolist(),
+            "shown": len(question.shown),
+            **question.to_json(event.answer),
+            "seconds": event.seconds,
+        }
 
     def _generation_fields(self, event: GenerationFinished) -> dict[str, Any]:
         return {
@@ -157,10 +161,10 @@ class Json(Watcher):
             "seconds": asdict(event.seconds),
             "candidates": event.candidates,
             **event.training,
-            "bounds": event.state.bounds.tolist(),
+            "bounds": event.bounds.tolist(),
             **asdict(event.front),
-            **asdict(event.utility),
-            **asdict(event.prediction),
+            "utility_max": event.utility_max,
+            **event.search,
             "front": [_policy_fields(policy) for policy in event.state.archive.members],
         }
 
@@ -176,15 +180,19 @@ def question_name(decided: Decided) -> str:
 
 def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
     """`policy 12 (time -66.1, fuel -57.3) of 9 shown; bounds time ≥ -70.2, fuel ≥ -60.4`."""
-    formats = [number_format(column) for column in decided.question.values.T]
-    values = values_in_words(decided.chosen.values, objectives, formats)
-    choice = f"policy {decided.chosen.id} ({values}) of {len(decided.question.front)} shown"
-    if decided.answer.stop:
+    question, chosen = decided.question, decided.chosen
+    if chosen is None:
+        answer = ", ".join(f"{name} {value}" for name, value in question.to_json(decided.answer).items())
+        return f"{answer} ({plural(len(question.shown), 'policy')} shown)"
+    formats = [number_format(column) for column in question.values.T]
+    values = values_in_words(chosen.values, objectives, formats)
+    choice = f"policy {chosen.id} ({values}) of {len(question.shown)} shown"
+    if question.stops(decided.answer):
         return f"{choice}, and stop"
-    if decided.question.purpose == "final":
+    if question.purpose == "final":
         return choice
     bounds = values_in_words(decided.bounds, objectives, formats, "≥ ")
-    silent = decided.answer.generations
+    silent = decided.generations_to_question or 0
     more = f", no question for {plural(silent, 'generation')}" if silent > 1 else ""
     return f"{choice}; bounds {bounds}{more}"
 

@@ -21,7 +21,7 @@ class Archive:
         return values_of(self.members)
 
     def offer(self, policies: Sequence[Policy]) -> "Archive":
-        """The archive with those of the policies that are not dominated, without those that now are.
+        """Return the archive with those of the policies that are not dominated, without those that now are.
 
         Of policies with equal values the first one stays. Raises ValueError if a policy's values are not
         one finite number per objective.

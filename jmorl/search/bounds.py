@@ -1,6 +1,10 @@
 """The part of objective space that a preferred policy leaves in play."""
 
+from collections.abc import Sequence
+
 import numpy as np
+
+from jmorl.search.policy import Policy, values_of
 
 
 def lower_bounds(preferred: np.ndarray, delta: float, unit: np.ndarray) -> np.ndarray:
@@ -14,3 +18,9 @@ def lower_bounds(preferred: np.ndarray, delta: float, unit: np.ndarray) -> np.nd
 def within(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     """Which of the vectors [N, M] reach the bounds [M] in every objective, [N]."""
     return np.all(values >= bounds, axis=1)
+
+
+def members_within(policies: Sequence[Policy], bounds: np.ndarray) -> list[Policy]:
+    """Return those of the policies, at least one, that reach the bounds [M]."""
+    inside = within(values_of(policies), bounds)
+    return [policy for policy, kept in zip(policies, inside, strict=True) if kept]

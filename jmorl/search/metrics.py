@@ -23,26 +23,6 @@ class FrontMetrics:
     sparsity: float
 
 
-@dataclass(frozen=True)
-class UtilityMetrics:
-    """What the decision maker's utility says; None for one without a utility.
-
-    The population of the paper's equations 6 and 7 is the performance buffer, for every method.
-    """
-
-    utility_max: float | None  # of the archive
-    utility_mean: float | None  # of the whole buffer
-    utility_mean_within_bounds: float | None  # of its members within the bounds, as the paper's interactive arm
-
-
-@dataclass(frozen=True)
-class PredictionMetrics:
-    """How good the prediction model was, in units of the archive's range; None in the warm-up."""
-
-    prediction_error: float | None  # mean absolute difference of predicted and realised values
-    realized_change: float | None  # that of parents and children: the error of predicting no change
-
-
 def front_metrics(values: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> FrontMetrics:
     """Metrics of the front [N, M] with reference point [M] and the grid of weights [W, M]."""
     return FrontMetrics(
@@ -50,24 +30,32 @@ def front_metrics(values: np.ndarray, reference: np.ndarray, weights: np.ndarray
     )
 
 
-def utility_metrics(
-    utility: Utility, archive: Sequence[Policy], buffer: Sequence[Policy], bounds: np.ndarray
-) -> UtilityMetrics:
-    """Metrics of archive and buffer, at least one policy each, under a utility."""
-    best, all_utilities = utility(values_of(archive)), utility(values_of(buffer))
-    if best is None or all_utilities is None:
-        return UtilityMetrics(None, None, None)
-    inside = all_utilities[within(values_of(buffer), bounds)]
-    return UtilityMetrics(float(best.max()), float(all_utilities.mean()), float(inside.mean()) if len(inside) else None)
+def utility_metrics(utility: Utility, population: Sequence[Policy], bounds: np.ndarray) -> dict[str, float | None]:
+    """Return the mean utility of a population, at least one policy, and of its members within the bounds [M].
+
+    None for a decision maker without a utility, and where no member is within the bounds.
+    """
+    utilities = utility(values_of(population))
+    if utilities is None:
+        return {"utility_mean": None, "utility_mean_within_bounds": None}
+    inside = utilities[within(values_of(population), bounds)]
+    return {
+        "utility_mean": float(utilities.mean()),
+        "utility_mean_within_bounds": float(inside.mean()) if len(inside) else None,
+    }
 
 
-def prediction_metrics(parents: Sequence[Policy], offspring: Sequence[Policy], scale: Scale) -> PredictionMetrics:
-    """Metrics of the predictions of a generation's offspring [P], in the archive's scale."""
+def prediction_metrics(parents: Sequence[Policy], offspring: Sequence[Policy], scale: Scale) -> dict[str, float | None]:
+    """Return how far predictions of a generation's offspring [P] were off, in the archive's scale; None in the warm-up.
+
+    `prediction_error` is the mean absolute difference of predicted and realised values, `realized_change` that of
+    parents and children: the error of predicting no change.
+    """
     if not parents:
-        return PredictionMetrics(None, None)
+        return {"prediction_error": None, "realized_change": None}
     realized = values_of(offspring)
     predicted = np.stack([child.predicted for child in offspring if child.predicted is not None])
-    return PredictionMetrics(
-        float((np.abs(predicted - realized) / scale.span).mean()),
-        float((np.abs(values_of(parents) - realized) / scale.span).mean()),
-    )
+    return {
+        "prediction_error": float((np.abs(predicted - realized) / scale.span).mean()),
+        "realized_change": float((np.abs(values_of(parents) - realized) / scale.span).mean()),
+    }

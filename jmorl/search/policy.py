@@ -28,5 +28,5 @@ class Policy:
 
 
 def values_of(policies: Sequence[Policy]) -> np.ndarray:  # [N, M]
-    """The objective vectors of at least one policy, stacked."""
+    """Return the objective vectors of at least one policy, stacked."""
     return np.stack([policy.values for policy in policies])

@@ -36,12 +36,12 @@ class Records:
         )
 
     def scaled(self, scale: Scale) -> "Records":
-        """The same records in the current scale; weights have none."""
+        """Return the same records in the current scale; weights have none."""
         return Records(scale.apply(self.parents), self.weights, scale.apply(self.children))
 
 
 def predict(candidates: np.ndarray, weights: np.ndarray, records: Records) -> np.ndarray:
-    """The children expected from training each candidate with each of the weights, [C, M], [W, M] -> [C, W, M].
+    """Return the children expected from training each candidate with each of the weights, [C, M], [W, M] -> [C, W, M].
 
     Per candidate and objective one curve is fitted to the near records' (weight, change), and evaluated
     at all weights. Without records no change is expected. Candidates and records in scaled values.
@@ -61,7 +61,7 @@ def predict(candidates: np.ndarray, weights: np.ndarray, records: Records) -> np
 
 
 def neighbourhoods(candidates: np.ndarray, records: Records) -> tuple[np.ndarray, np.ndarray]:
-    """Importance and index, [K, C] each, of the records near each candidate; importance 0 fills a column up.
+    """Return importance and index, [K, C] each, of the records near each candidate; importance 0 fills a column up.
 
     How often tau and sigma double is computed, not searched for, so no record is too far away.
     """
@@ -76,7 +76,7 @@ def neighbourhoods(candidates: np.ndarray, records: Records) -> tuple[np.ndarray
 
 
 def _doublings_until_near(distances: np.ndarray) -> np.ndarray:
-    """The least k >= 0 with distance < tau 2^k; of any shape."""
+    """Return the least k >= 0 with distance < tau 2^k; of any shape."""
     # distance / tau = mantissa 2^exponent with mantissa in [0.5, 1), so it is < 2^exponent and >= 2^(exponent - 1)
     _, exponent = np.frexp(distances / NEARNESS)
     return np.maximum(exponent, 0)

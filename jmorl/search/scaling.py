@@ -7,6 +7,8 @@ import numpy as np
 
 from jmorl.search.bounds import within
 
+REFERENCE_MARGIN = 0.1  # of the range, below the worst: neither extremes nor the middle dominate a gain
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -25,7 +27,7 @@ class Scale:
 
 
 def range_scale(values: np.ndarray) -> Scale:
-    """The scale that maps the vectors [N, M], N >= 1, to [0, 1]; an objective without range keeps its unit."""
+    """Return the scale that maps the vectors [N, M], N >= 1, to [0, 1]; an objective without range keeps its unit."""
     origin, best = values.min(axis=0), values.max(axis=0)
     return Scale(origin, np.where(best > origin, best - origin, 1.0))
 
@@ -36,7 +38,7 @@ def search_scale(
     reference: np.ndarray,  # [M]
     kind: Literal["range", "none"],
 ) -> Scale:
-    """The scale of a generation.
+    """Return the scale of a generation.
 
     "range": that of the archive members within the bounds if there are two, else of the whole archive.
     "none": values less the reference point, in their own units, as in the paper.

@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 
+from jmorl.methods.base import Method
 from jmorl.state import RunState
 from jmorl.storage.files import partial_path, sync
-from jmorl.storage.serialization import PackedState, pack
+from jmorl.storage.serialization import PackedState, from_format_1, pack
 from jmorl.storage.versions import check_format
 
-FORMAT = 1
+FORMAT = 2
 DOCUMENT = "checkpoint.json"
 ARRAYS = "arrays"
 
@@ -56,10 +57,11 @@ class CheckpointWriter:
     What goes wrong there is raised, as CheckpointError, by the next `save` or `wait`.
     """
 
-    def __init__(self, folder: Path, run: str, keep: int):
+    def __init__(self, folder: Path, run: str, keep: int, method: Method[Any]):
         self.folder = folder
         self.run = run
         self.keep = keep
+        self.method = method
         self._thread = ThreadPoolExecutor(1, "checkpoints")
         self._writing: Future[None] | None = None
 
@@ -83,7 +85,7 @@ class CheckpointWriter:
 
     def _write(self, state: RunState, logs: Mapping[str, str]) -> None:
         try:
-            write_checkpoint(self.folder, Checkpoint(state.generation, self.run, pack(state), logs))
+            write_checkpoint(self.folder, Checkpoint(state.generation, self.run, pack(state, self.method), logs))
             for generation in stored_generations(self.folder)[: -self.keep]:
                 shutil.rmtree(checkpoint_path(self.folder, generation))
         except Exception as error:  # Orbax has several of its own for a full disk
@@ -141,6 +143,8 @@ def read_checkpoint(folder: Path, generation: int) -> Checkpoint:
         _check(path / name, fingerprint)
     logs = {name: (path / name).read_bytes().decode() for name in document["logs"]}
     packed = PackedState(document["state"], _read_arrays(path / ARRAYS))
+    if document["format"] == 1:
+        packed = from_format_1(packed)
     return Checkpoint(document["generation"], document["run"], packed, logs)
 
 

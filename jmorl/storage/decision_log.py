@@ -1,10 +1,11 @@
 """The decision log of a run folder, where an answer is on the disk before the run goes on."""
 
 from pathlib import Path
+from typing import Any
 
-from jmorl.decision.protocol import Answer, Question
-from jmorl.decision.records import DecisionRecord, ScriptError, decision_record, from_json, to_json
-from jmorl.decision.remembered import is_of
+from jmorl.decision.protocol import AnyQuestion
+from jmorl.decision.records import PointRecord, ScriptError, from_json, record_of, to_json
+from jmorl.decision.remembered import RunRecord, answer_in, is_of
 from jmorl.storage.files import append_text, write_text
 
 
@@ -29,15 +30,15 @@ class DecisionLog:
         if text != self._text():
             write_text(path, self._text())
 
-    def add(self, question: Question, answer: Answer) -> None:
+    def add(self, question: AnyQuestion, answer: Any) -> None:
         """Note an answer. One that was ahead is not written again."""
-        record = decision_record(question, answer)
+        record = record_of(question, answer)
         expected = self.ahead.pop(0) if self.ahead else None
         self.past += to_json(record) + "\n"
         if expected is None:
             append_text(self.path, to_json(record) + "\n")
         elif expected != record:
-            if not is_of(expected, question) or answer != Answer(expected.policy, expected.stop, expected.generations):
+            if not is_of(expected, question) or answer != answer_in(expected, question):
                 self.ahead.clear()
             write_text(self.path, self._text())
 
@@ -45,9 +46,9 @@ class DecisionLog:
         return self.past + "".join(to_json(record) + "\n" for record in self.ahead)
 
 
-def _answers(text: str) -> list[DecisionRecord]:
-    """The records of whole lines, up to the first that is none."""
-    answers: list[DecisionRecord] = []
+def _answers(text: str) -> list[RunRecord]:
+    """Return the records of whole lines, up to the first that is none."""
+    answers: list[RunRecord] = []
     for line in text.splitlines(keepends=True):
         record = _answer(line)
         if record is None:
@@ -56,9 +57,9 @@ def _answers(text: str) -> list[DecisionRecord]:
     return answers
 
 
-def _answer(line: str) -> DecisionRecord | None:
+def _answer(line: str) -> RunRecord | None:
     try:
         record = from_json(line)
     except ScriptError:
         return None
-    return record if isinstance(record, DecisionRecord) and line.endswith("\n") else None
+    return None if isinstance(record, PointRecord) or not line.endswith("\n") else record

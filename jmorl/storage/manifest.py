@@ -15,7 +15,7 @@ import jax
 from jmorl.config import Config
 from jmorl.storage.versions import check_format
 
-FORMAT = 1
+FORMAT = 2
 PACKAGES = ("jmorl", "jax", "jaxlib", "flax", "optax", "numpy", "scipy", "moocore", "orbax-checkpoint")
 
 Manifest = dict[str, Any]
@@ -30,7 +30,7 @@ def new_manifest(config: Config, parent: Manifest | None = None) -> Manifest:
         "parent": parent,
         "started": now(),
         "command": [Path(program).name, *arguments],
-        "config": config.digest(),
+        "config": config.identity(),
         "seed": config.seed,
         "commit": _commit(),
         **circumstances(),

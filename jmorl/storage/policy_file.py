@@ -82,7 +82,7 @@ def save_policy(
         "discounted": policy.discounted.tolist(),
         "evaluation_episodes": config.evaluation.episodes,
         "discount": config.ppo.discount,
-        "run": {"id": run, "config": config.digest(), "method": config.method, "seed": config.seed},
+        "run": {"id": run, "config": config.identity(), "method": config.method, "seed": config.seed},
         "network": {
             "sizes": [environment.observation_size, *config.ppo.hidden_sizes, environment.action_size],
             "activation": "tanh",

@@ -19,7 +19,7 @@ from jmorl.decision.users import make_user
 from jmorl.display.commands import command
 from jmorl.events import Event
 from jmorl.learning.population import Population
-from jmorl.loop import run
+from jmorl.loop import make_method, run
 from jmorl.search.policy import Policy
 from jmorl.state import RunState
 from jmorl.storage.checkpoints import (
@@ -113,7 +113,8 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
     environment = _environment(config)
     decision_maker = _new_user(config, environment)
     checkpoint = _the_checkpoint(path, generation, manifest)
-    state = replace(_unpacked(path, checkpoint, config, environment), silent_generations=0)
+    state = _unpacked(path, checkpoint, config, environment)
+    state = replace(state, search=make_method(config, environment).asking_at_once(state.search))
     parent = {"run": manifest["run"], "name": path.resolve().name, "generation": generation}
     check_free(out, force)
     if out.resolve() in (path.resolve(), *path.resolve().parents):
@@ -143,10 +144,10 @@ def _read_start(path: Path) -> tuple[Manifest, Config]:
         manifest = read_manifest(path)
         config = resolve(file=path / "config.toml")
         run, started, version = manifest["run"], manifest["config"], manifest["packages"]["jmorl"]
-        if config.digest() != started:
+        if not config.is_identified_by(started):
             raise CannotContinue(
                 f"{path / 'config.toml'} is not what run {run} was started with (by jmorl {version}: {started}, now: "
-                f"{config.digest()}); restore it, or start a run of its own with `jmorl train --config`"
+                f"{config.identity()}); restore it, or start a run of its own with `jmorl train --config`"
             )
     except (CannotContinue, NewerFormat):
         raise

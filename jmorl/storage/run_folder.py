@@ -35,6 +35,7 @@ from envs.core import Environment
 from jmorl.config import Config
 from jmorl.display.commands import command
 from jmorl.events import Decided, Event, GenerationFinished, RunFinished
+from jmorl.loop import make_method
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
 from jmorl.storage.decision_log import DecisionLog
@@ -63,7 +64,9 @@ class RunFolder:
         self.metrics = CsvLog(path / "metrics.csv")
         self.policies = CsvLog(path / "policies.csv")
         self.decisions = DecisionLog(path / "decisions.jsonl")
-        self.checkpoints = CheckpointWriter(path / "checkpoints", manifest["run"], config.checkpoints.keep)
+        self.checkpoints = CheckpointWriter(
+            path / "checkpoints", manifest["run"], config.checkpoints.keep, make_method(config, environment)
+        )
 
     @classmethod
     def create(
@@ -172,12 +175,12 @@ class RunFolder:
             "questions": state.questions,
             "policies_shown": state.policies_shown,
             "candidates": event.candidates,
-            **self._named("bound", state.bounds),
-            **self._named("sigma", state.units.deviation if state.units else np.full_like(state.bounds, np.nan)),
+            **self._named("bound", event.bounds),
+            **self._named("sigma", state.units.deviation if state.units else np.full_like(event.bounds, np.nan)),
             **event.training,
             **asdict(event.front),
-            **asdict(event.utility),
-            **asdict(event.prediction),
+            "utility_max": event.utility_max,
+            **event.search,
         }
 
     def _policy_row(self, policy: Policy) -> Row:

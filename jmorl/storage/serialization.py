@@ -16,15 +16,16 @@ import numpy as np
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.moppo import MOPPO
+from jmorl.loop import make_method
+from jmorl.methods.base import Method
 from jmorl.search.archive import Archive
-from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
-from jmorl.search.prediction import Records
 from jmorl.state import RunState
 from jmorl.units import RunningUnits
 
 COUNTERS = tuple(field.name for field in fields(RunState) if field.type is int)
 VECTORS = ("weights", "values", "std", "discounted")  # of a policy, [M]
+SEARCH = "search_"  # before the names of the method's own arrays
 
 
 class PackingError(ValueError):
@@ -39,10 +40,12 @@ class PackedState:
     arrays: Mapping[str, np.ndarray]
 
 
-def pack(state: RunState) -> PackedState:
-    """The whole state, after the warm-up or later. Every policy that it mentions is kept once."""
+def pack(state: RunState, method: Method[Any]) -> PackedState:
+    """Return the whole state, after the warm-up or later. Every policy that it mentions is kept once."""
     assert state.reference_point is not None, "the warm-up sets it"
-    known = {policy.id: policy for policy in _mentioned(state)}
+    search = method.pack(state.search)
+    choice = (state.choice,) if state.choice else ()
+    known = {policy.id: policy for policy in (*state.archive.members, *search.policies, *choice)}
     policies = [known[each] for each in sorted(known)]
     document = {
         "counters": {name: int(getattr(state, name)) for name in COUNTERS},
@@ -51,8 +54,8 @@ def pack(state: RunState) -> PackedState:
             for p in policies
         ],
         "archive": [policy.id for policy in state.archive.members],
-        "buffer": [policy.id for policy in state.buffer.members],
         "choice": state.choice.id if state.choice else None,
+        "search": search.document,
         "snapshot": _columns(policies[0].snapshot),
     }
     vectors = {name: np.stack([getattr(policy, name) for policy in policies]) for name in VECTORS}
@@ -60,25 +63,24 @@ def pack(state: RunState) -> PackedState:
     arrays = {
         **vectors,
         "predicted": np.stack([nothing if p.predicted is None else p.predicted for p in policies]),
-        "bounds": state.bounds,
         "reference_point": state.reference_point,
         **_packed_units(state.units, policies),
-        **_packed_records(state.records),
+        **{f"{SEARCH}{name}": array for name, array in search.arrays.items()},
         **_packed([policy.snapshot for policy in policies]),
     }
     return PackedState(document, arrays)
 
 
 def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -> RunState:
-    """The state as it was, bit for bit.
+    """Return the state as it was, bit for bit.
 
-    Raises PackingError if its snapshots are not those of the train_states that `config` describes.
+    Raises PackingError if its snapshots are not those of the train states that `config` describes.
     """
     document, arrays = packed.document, packed.arrays
     train_state = jax.eval_shape(MOPPO(environment, config.ppo).initial_train_state, jax.eval_shape(jax.random.key, 0))
     expected = _columns(train_state)
     if document["snapshot"] != expected:
-        raise PackingError(f"it has train_states of another shape: {_first_difference(document['snapshot'], expected)}")
+        raise PackingError(f"it has train states of another shape: {_first_difference(document['snapshot'], expected)}")
     snapshots = _unpacked(arrays, len(document["policies"]), train_state)
     policies = {
         origin["id"]: Policy(
@@ -92,12 +94,10 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
         )
         for row, origin in enumerate(document["policies"])
     }
-    buffer = tuple(policies[each] for each in document["buffer"])
     choice = document["choice"]
+    own = {name.removeprefix(SEARCH): array for name, array in arrays.items() if name.startswith(SEARCH)}
     return RunState(
-        buffer=PerformanceBuffer(config.search.buffer_bins, config.search.buffer_size, buffer),
-        records=_unpacked_records(arrays),
-        bounds=arrays["bounds"],
+        search=make_method(config, environment).unpack(document["search"], own, policies),
         archive=Archive(tuple(policies[each] for each in document["archive"])),
         units=RunningUnits(*arrays["units"]) if "units" in arrays else None,
         reference_point=arrays["reference_point"],
@@ -106,8 +106,19 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
     )
 
 
-def _mentioned(state: RunState) -> tuple[Policy, ...]:
-    return (*state.archive.members, *state.buffer.members, *([state.choice] if state.choice else []))
+def from_format_1(packed: PackedState) -> PackedState:
+    """Return a state as packed by the first version, which knew one search only, in the present form."""
+    document, arrays = dict(packed.document), dict(packed.arrays)
+    counters = dict(document["counters"])
+    document["search"] = {
+        "buffer": document.pop("buffer"),
+        "silent_generations": counters.pop("silent_generations"),
+    }
+    document["counters"] = counters
+    arrays["std"] = arrays.pop("spread")
+    own = [name for name in arrays if name == "bounds" or name.startswith("records_")]
+    arrays |= {f"{SEARCH}{name}": arrays.pop(name) for name in own}
+    return PackedState(document, arrays)
 
 
 def _packed_units(units: RunningUnits | None, policies: Sequence[Policy]) -> dict[str, np.ndarray]:
@@ -116,16 +127,6 @@ def _packed_units(units: RunningUnits | None, policies: Sequence[Policy]) -> dic
         return {}
     raw = [policy.raw for policy in policies if policy.raw is not None]  # all of them
     return {"units": np.stack(list(vars(units).values())), "raw": np.stack(raw)}
-
-
-def _packed_records(records: Records) -> dict[str, np.ndarray]:
-    """None before the first generation: Orbax refuses arrays without elements."""
-    return {f"records_{name}": array for name, array in vars(records).items() if len(array)}
-
-
-def _unpacked_records(arrays: Mapping[str, np.ndarray]) -> Records:
-    names = [f"records_{field.name}" for field in fields(Records)]
-    return Records(*(arrays[name] for name in names)) if names[0] in arrays else Records.empty(len(arrays["bounds"]))
 
 
 def _columns(snapshot: Any) -> list[list[Any]]:
@@ -147,7 +148,7 @@ def _packed(snapshots: Sequence[Any]) -> dict[str, np.ndarray]:
 
 
 def _unpacked(arrays: Mapping[str, np.ndarray], count: int, train_state: Any) -> list[Any]:
-    """The snapshots, shaped as `train_state`. Each has its own memory, so that none keeps the others alive."""
+    """Return the snapshots, shaped as `train_state`. Each has its own memory, so that none keeps the others alive."""
     leaves, tree = jax.tree.flatten(train_state)
     found: list[list[Any]] = [[None] * len(leaves) for _ in range(count)]
     for kind, indices in _kinds(leaves).items():

@@ -1,1 +1,1 @@
-"""A web page on which a person steers the search; its parts are told in the README, "The studio"."""
+"""A web page on which a person steers the search. The README explains it under "The studio"."""

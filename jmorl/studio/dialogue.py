@@ -13,7 +13,7 @@ from jmorl.search.policy import Policy, values_of
 
 @dataclass(frozen=True, eq=False)
 class Dialogue:
-    """Where a dialogue stands: at a question, or at its end."""
+    """The state of a dialogue: at a question, or at its end."""
 
     generation: int  # whose front this is
     objectives: tuple[Objective, ...]
@@ -24,12 +24,12 @@ class Dialogue:
 
     @property
     def chosen(self) -> Policy | None:
-        """The policy that the dialogue has led to; None before its end."""
+        """Return the policy that the dialogue has led to; None before its end."""
         return self.front[enautilus.result(self.state)] if enautilus.finished(self.state) else None
 
     @cached_property
     def question(self) -> PointQuestion:
-        """The question that is open. Raises ValueError at the end. Takes a moment for a large front."""
+        """Return the question that is open. Raises ValueError at the end. Takes a moment for a large front."""
         points = enautilus.intermediate_points(self.state)
         return PointQuestion(self.generation, len(self.records), self.objectives, self.front, self.state, points)
 
@@ -37,14 +37,14 @@ class Dialogue:
 def begin(
     front: tuple[Policy, ...], objectives: tuple[Objective, ...], generation: int, iterations: int, points: int
 ) -> Dialogue:
-    """A new dialogue. Raises ValueError for an empty front, or for numbers below 1."""
+    """Begin a dialogue. Raises ValueError for an empty front, or for numbers below 1."""
     if not front:
         raise ValueError("there is no front yet")
     return Dialogue(generation, objectives, front, enautilus.begin(values_of(front), iterations, points))
 
 
 def reply(dialogue: Dialogue, answer: PointAnswer) -> Dialogue:
-    """The dialogue after an answer. Raises ValueError if the question does not allow it."""
+    """Return the dialogue after an answer. Raises ValueError if the question does not allow it."""
     question = dialogue.question
     state = respond(question, answer)
     records = (*dialogue.records, point_record(question, answer))

@@ -1,6 +1,6 @@
 """A recorded episode as JSON for the player on the page.
 
-What does not move is said once; of what moves, every frame has its own shapes. Totals are those of every frame.
+Shapes that do not move are given once; every frame has its own shapes of what moves, and its own totals.
 """
 
 from math import ceil
@@ -16,7 +16,7 @@ DIGITS = 4
 
 
 def episode_json(recording: Recording) -> dict[str, Any]:
-    """Frames no nearer than a thirtieth of a second, the last one included.
+    """Return an episode as frames no nearer than a thirtieth of a second, the last step included.
 
         {"seconds": between two frames, "still": [shape, ...],
          "frames": [{"step", "window", "shapes": [shape, ...], "totals": [M]}, ...]}
@@ -41,7 +41,7 @@ def episode_json(recording: Recording) -> dict[str, Any]:
 
 
 def _still(scenes: list[dict[str, Any]]) -> int:
-    """How many of the first shapes are the same in every scene: later ones are drawn over them."""
+    """Count how many of the first shapes are the same in every scene: later ones are drawn over them."""
     first = scenes[0]["shapes"]
     for index, shape in enumerate(first):
         if any(len(scene["shapes"]) <= index or scene["shapes"][index] != shape for scene in scenes):

@@ -1,6 +1,6 @@
-"""Who may talk to the studio: only pages of its own, under a name of its own, with the token where one is asked for.
+"""The guard of the studio: only its own pages pass, under its own names, with the token where there is one.
 
-One door for everything: pages, files, HTTP polling and web sockets all pass here before anything else sees them.
+There is one door for everything: pages, files, HTTP polling and web sockets pass here before anything else sees them.
 """
 
 import ipaddress
@@ -24,7 +24,7 @@ HEADERS = (  # nobody frames the page, and no file is taken for something else
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a server that listens on `host` can only be reached from this machine."""
+    """Return whether a server that listens on `host` can only be reached from this machine."""
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -54,7 +54,7 @@ class Guard:
             await refusal(scope, receive, send)
 
     def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> Response | None:
-        """What is answered instead; None for who may pass."""
+        """Return the answer to a request that may not pass; None if it may."""
         if not self._is_own_name(headers.get("host", "")):
             return PlainTextResponse("This server is not known under that name.", 421)
         if not _is_own_page(headers):
@@ -64,7 +64,7 @@ class Guard:
         return None
 
     def _is_own_name(self, host: str) -> bool:
-        """An address cannot be rebound to another machine by its owner's name server; a name can, unless it is ours."""
+        """Return whether the host is an address or one of our names: any other name can be rebound to this machine."""
         name = urlsplit(f"//{host}").hostname or ""
         try:
             return bool(ipaddress.ip_address(name))
@@ -79,7 +79,7 @@ class Guard:
         return cookie is not None and self._is_token(cookie.value)
 
     def _welcome(self, scope: Scope) -> Response:
-        """A cookie for who has the token in the address, from which it vanishes; a refusal for others."""
+        """Give a cookie to a request with the token in its address, and take it out of there; refuse any other."""
         query = parse_qsl(scope.get("query_string", b"").decode("latin-1"))
         if scope["type"] == "http" and any(name == "token" and self._is_token(value) for name, value in query):
             rest = urlencode([(name, value) for name, value in query if name != "token"])
@@ -95,7 +95,7 @@ class Guard:
 
 
 def _is_own_page(headers: Mapping[str, str]) -> bool:
-    """Whether a browser says that a page of ours asks, or that somebody follows a link; other programs say nothing."""
+    """Return whether one of our pages asks, or somebody follows a link; programs other than browsers do not say."""
     origin, site = headers.get("origin"), headers.get("sec-fetch-site", "none")
     if origin is not None:
         return urlsplit(origin).netloc == headers.get("host")

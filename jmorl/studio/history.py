@@ -23,12 +23,12 @@ class Branch:
 
     @property
     def name(self) -> str:
-        """That of its folder."""
+        """Return the name of its folder."""
         return self.path.name
 
 
 def read_tree(path: Path) -> tuple[Branch, ...]:
-    """The run in a folder and its relatives in the folders beside it, each followed by the branches that leave it."""
+    """Read the run in a folder and its relatives in the folders beside it, each followed by its own branches."""
     path = path.resolve()
     manifests = {each: manifest for each in path.parent.iterdir() if (manifest := _manifest(each))}
     by_run = {manifest["run"]: each for each, manifest in manifests.items()} | {manifests[path]["run"]: path}
@@ -39,7 +39,7 @@ def read_tree(path: Path) -> tuple[Branch, ...]:
 
 
 def free_folder(path: Path) -> Path:
-    """Where a branch of the run in a folder may be written: beside it, with the next free number."""
+    """Return a folder for a branch of the run in a folder: beside it, with the next free number."""
     first = read_tree(path)[0].path
     number = 2
     while first.with_name(f"{first.name}-{number}").exists():
@@ -78,7 +78,7 @@ def _decisions(path: Path) -> list[DecisionRecord]:
 
 
 def _manifest(path: Path) -> Manifest | None:
-    """That of a run; None for a folder that has none that can be read."""
+    """Read the manifest of a run; None for a folder without a readable one."""
     try:
         manifest = read_manifest(path) if (path / "config.toml").exists() else {}
     except (OSError, ValueError, KeyError):

@@ -1,4 +1,4 @@
-"""A person somewhere else, who answers when they answer."""
+"""A person elsewhere, who answers when they like."""
 
 import threading
 from collections.abc import Callable
@@ -7,13 +7,13 @@ from jmorl.decision.protocol import Answer, DecisionMaker, Question
 
 
 class LeftOff(Exception):
-    """The run is left while its question is open; resumed, it asks again."""
+    """The end of a run that is left while its question is open; resumed, it asks again."""
 
 
 class Person(DecisionMaker):
-    """Waits for somebody to reply, and takes the first reply to each question.
+    """A decision maker that waits for somebody to reply, and takes the first reply to each question.
 
-    `asked` is told of every question that is put, in the thread of the run.
+    `asked` is called with every question, in the thread of the run.
     """
 
     def __init__(self, asked: Callable[[Question], None]):
@@ -24,7 +24,7 @@ class Person(DecisionMaker):
         self._left = False
 
     def answer(self, question: Question) -> Answer:
-        """What somebody replies. Raises LeftOff when the run is left instead."""
+        """Return somebody's reply. Raises LeftOff when the run is left instead."""
         with self._changed:
             self._question, self._answer = question, None
         self.asked(question)
@@ -36,7 +36,7 @@ class Person(DecisionMaker):
             return self._answer
 
     def reply(self, question: Question, answer: Answer) -> bool:
-        """Answer a question; False if it is not open: somebody else was first, or the run was left.
+        """Answer a question. Return False if it is not open: somebody else was first, or the run was left.
 
         Raises ValueError, and the question stays open, if its front has no such policy.
         """

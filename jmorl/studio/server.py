@@ -40,7 +40,7 @@ def check_address(host: str, port: int) -> None:
 
 
 def address(host: str, port: int, token: str | None) -> str:
-    """What to open in a browser."""
+    """Return the address to open in a browser."""
     name = platform.node() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
     return f"http://{name}:{port}/" + (f"?{urlencode({'token': token})}" if token else "")
 
@@ -66,7 +66,7 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
 
 
 def is_trouble(record: logging.LogRecord) -> bool:
-    """Whether the server's log should have it: a request that is broken off at the end is none."""
+    """Return whether a record belongs in the server's log: requests broken off when the server ends do not."""
     broken_off = record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError)
     return not broken_off and "graceful shutdown exceeded" not in record.getMessage()
 
@@ -86,7 +86,7 @@ def _run(host: str, port: int) -> None:
 
 
 def _add_files(session: Session) -> None:
-    """What the page asks for beside itself. Runs are named by their ids, policies by numbers: no path is taken."""
+    """Serve what the page asks for beside itself. Runs are named by ids, policies by numbers: no path is taken."""
 
     @app.get("/episodes/{run}/{policy}")
     def episode(run: str, policy: int) -> JSONResponse:
@@ -110,5 +110,5 @@ def _file(session: Session, run: str, policy: int) -> Path:
 
 @lru_cache(maxsize=32)
 def _episode(path: Path) -> dict[str, Any]:
-    """The episode from the first of `jmorl evaluate`'s starts."""
+    """Record an episode from the first of `jmorl evaluate`'s starts."""
     return episode_json(record(load_policy(path), jax.random.split(jax.random.key(0), 1)[0]))

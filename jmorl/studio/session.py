@@ -9,16 +9,18 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import envs
 from jmorl.decision.protocol import Answer, PointAnswer, Question
 from jmorl.events import RunFinished
+from jmorl.loop import make_method
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
-from jmorl.state import RunState, prospect
+from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
@@ -31,11 +33,14 @@ from jmorl.studio.view import PERSON, View, after, stored_view
 
 
 class Session:
-    """The run that is open, and what is laid out of it."""
+    """The run that is open, and what is laid out of it.
+
+    `background` works out what choosing a policy would mean, one policy after the other; it ends with the session.
+    """
 
     view: View
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, clock: Callable[[], float] = time.monotonic, background: Executor | None = None):
         self.clock = clock
         self.selection = Selection()
         self.dialogue: Dialogue | None = None
@@ -44,7 +49,7 @@ class Session:
         self._moving = threading.Lock()  # while one run is left for another
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
-        self._thinking = ThreadPoolExecutor(1, "prospects")
+        self._background = background or ThreadPoolExecutor(1, "prospects")
 
     def open(self, path: Path) -> None:
         """Show the run in a folder, and go on with it if it has not ended. Raises as `resume` and `read_run` do."""
@@ -60,21 +65,32 @@ class Session:
         timeline = Timeline(folder.config, self.clock())
         self.view = replace(self.view, timeline=timeline, notes=continued.notes, result=None, reason="")
         self.leaving = False
-        self._person = Person(self._asked) if folder.config.user == PERSON else None
+        self._person = Person(self.ask) if folder.config.user == PERSON else None
         self._thread = threading.Thread(target=self._run, args=(continued, self._person), name="run")
         self._thread.start()
 
+    def ask(self, question: Question) -> None:
+        """Open a question of the run, and see what is laid out in its light."""
+        self.view = replace(self.view, question=question, bounds=question.bounds)
+        self._rearrange(lambda selection: replace(selection, prospects={}))
+        for policy in self.selection.letters:
+            if self.view.policy(policy):
+                self._think(question, policy)
+            else:
+                self.put_away(policy)
+
     def answer(self, question: Question, answer: Answer) -> bool:
-        """Answer the open question; False if it is no longer open. Raises ValueError if it has no such policy."""
+        """Answer the open question. Return False if it is open no more. Raises ValueError if it has no such policy."""
         return self._person is not None and self._person.reply(question, answer)
 
     def look_at(self, policy: int) -> None:
-        """Lay a policy out and put it in focus; nothing if there is none."""
+        """Lay a policy out and put it in focus; do nothing if there is none."""
         if self.view.policy(policy):
             self._rearrange(lambda selection: selection.with_policy(policy))
             self._think(self.view.question, policy)
 
     def put_away(self, policy: int) -> None:
+        """Lay a policy out no longer."""
         self._rearrange(lambda selection: selection.without(policy))
 
     def more_of(self, objective: int | None) -> None:
@@ -84,7 +100,7 @@ class Session:
         self._rearrange(lambda selection: replace(selection, more_of=objective, than=than))
 
     def history(self) -> tuple[Branch, ...]:
-        """The run that is open among its branches."""
+        """Read the run that is open, and its branches."""
         return read_tree(self.view.path)
 
     def step_back(self, run: str, generation: int) -> None:
@@ -115,7 +131,7 @@ class Session:
         self._move_to(dialogues.begin(view.front, view.objectives, generation, iterations, points))
 
     def reply(self, at: Dialogue, answer: PointAnswer) -> bool:
-        """Answer in E-NAUTILUS; False if the dialogue has moved on. Raises ValueError for what is not possible."""
+        """Answer in E-NAUTILUS. Return False if the dialogue has moved on. Raises ValueError for a wrong answer."""
         if at is not self.dialogue:
             return False
         self._move_to(dialogues.reply(at, answer))
@@ -127,10 +143,11 @@ class Session:
             self.dialogue = self.dialogue.before
 
     def close_dialogue(self) -> None:
+        """Leave E-NAUTILUS."""
         self.dialogue = None
 
     def policy_file(self, run: str, policy: int) -> Path | None:
-        """The file of an archived policy of a run in the history."""
+        """Return the file of an archived policy of a run in the history; None if there is none."""
         member = next((each for each in self.history() if each.run == run), None)
         path = member.path / "policies" / f"{policy:05d}.npz" if member else None
         return path if path and path.is_file() else None
@@ -140,19 +157,24 @@ class Session:
         self.leaving = True
         if self._person:
             self._person.leave()
-        if self._thread:
-            self._thread.join()
-            self._thread = None
+        self.wait()
         self.leaving = False
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the run has ended or was left. Return False if that takes longer than `timeout` seconds."""
+        thread = self._thread
+        if thread:
+            thread.join(timeout)
+        return thread is None or not thread.is_alive()
 
     def close(self) -> None:
         """Leave the run, and do nothing any more."""
         self.leave()
-        self._thinking.shutdown(cancel_futures=True)
+        self._background.shutdown(cancel_futures=True)
 
     @contextmanager
     def _move(self) -> Iterator[None]:
-        """One at a time. Raises ValueError for the second."""
+        """Allow one move from run to run at a time. Raises ValueError for a second one."""
         if not self._moving.acquire(blocking=False):
             raise ValueError("another tab is just leaving this run; nothing has changed")
         try:
@@ -161,7 +183,7 @@ class Session:
             self._moving.release()
 
     def _run(self, continued: Continued, person: Person | None) -> None:
-        """What the thread does."""
+        """Run to the end, or until the run is left, and keep the view up to date; the thread of the run does this."""
         try:
             with continued.folder:
                 for event in continued.events(person):
@@ -179,16 +201,6 @@ class Session:
         finally:
             self.view = replace(self.view, timeline=None, question=None)
 
-    def _asked(self, question: Question) -> None:
-        """A question is open: what is laid out is seen in its light."""
-        self.view = replace(self.view, question=question, bounds=question.bounds)
-        self._rearrange(lambda selection: replace(selection, prospects={}))
-        for policy in self.selection.letters:
-            if self.view.policy(policy):
-                self._think(question, policy)
-            else:
-                self.put_away(policy)
-
     def _show(self, path: Path) -> None:
         """Show what the folder has; of a run that has ended, its result is laid out."""
         self.view = stored_view(path)
@@ -199,15 +211,17 @@ class Session:
     def _think(self, question: Question | None, policy: int) -> None:
         """Find out in the background what choosing the policy would mean."""
         state = self.view.state
-        if question and question.purpose == "steer" and state and policy not in self.selection.prospects:
-            self._thinking.submit(self._note_prospect, question, state, policy)
+        if question and question.purpose != "final" and state and policy not in self.selection.prospects:
+            self._background.submit(self._note_prospect, question, state, policy)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
         try:
-            found = prospect(self.view.config, state, question.policy(policy))
+            chosen = question.policy(policy)
         except ValueError:  # a policy that is looked at, but not to choose from
             return
-        if self.view.question is question:
+        config = self.view.config
+        found = make_method(config, envs.make(config.env)).prospect(state, chosen)
+        if found and self.view.question is question:
             self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: found}))
 
     def _rearrange(self, change: Callable[[Selection], Selection]) -> None:

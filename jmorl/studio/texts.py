@@ -1,16 +1,17 @@
-"""What the page says, as text."""
+"""The texts of the page."""
 
 import re
 
 import numpy as np
 
 from jmorl.display.text import duration, front_question, number_format, plural, short_count, values_in_words
+from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
-from jmorl.state import Prospect
-from jmorl.studio.selection import Selection
+from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import PERSON, View
 
+POLICIES, PROGRESS, HISTORY, NAVIGATION = "Policies", "Progress", "History", "E-NAUTILUS"  # titles of panels
 KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
@@ -24,7 +25,7 @@ KEYS = (
 
 
 def phase(view: View, now: float, leaving: bool = False) -> str:
-    """What is going on."""
+    """Say what is going on."""
     timeline = view.timeline
     if view.problem:
         return f"Stopped: {view.problem}"
@@ -49,7 +50,7 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
 
 
 def facts(view: View, now: float) -> str:
-    """How far the run is, and how fast; empty for a run that does not go on."""
+    """Say how far the run is, and how fast; nothing for a run that does not go on."""
     timeline = view.timeline
     if timeline is None:
         return ""
@@ -64,13 +65,13 @@ def facts(view: View, now: float) -> str:
 
 
 def share_done(view: View, now: float) -> float:
-    """Of the budget of steps, from 0 to 1."""
+    """Return the share of the budget of steps that is used, from 0 to 1."""
     timeline = view.timeline
     return timeline.steps(now) / timeline.total_steps if timeline else float(view.result is not None)
 
 
 def heading(view: View, selection: Selection) -> str:
-    """What is asked, or what there is to see."""
+    """Say what is asked, or what there is to see."""
     question, more = view.question, wanted(view, selection)
     if more is not None and selection.more_of is not None and selection.than is not None:
         label = view.objectives[selection.more_of].label
@@ -85,7 +86,7 @@ def heading(view: View, selection: Selection) -> str:
         return "What there is to see comes with the end of the warm-up."
     if view.config.user != PERSON:
         return f"User {view.config.user} decides; you watch."
-    if view.config.method != "interactive":
+    if view.timeline.silent is None:
         return "You are asked once, at the end."
     if view.timeline.silent > 1:
         return f"You are asked again in {view.timeline.silent} generations."
@@ -93,13 +94,13 @@ def heading(view: View, selection: Selection) -> str:
 
 
 def scores(view: View, policy: Policy) -> str:
-    """All scores of a policy in one line."""
+    """Return all scores of a policy in one line."""
     each = zip(view.objectives, score_of_each(view, policy), strict=True)
     return ", ".join(f"{objective.label} {score}" for objective, score in each)
 
 
 def raw_returns(view: View, policy: Policy) -> str:
-    """The mean undiscounted returns of a policy whose scores are in other units; empty where they are the scores."""
+    """Return the mean undiscounted returns of a policy; nothing where they are its scores."""
     if policy.raw is None:
         return ""
     formats = [number_format(np.array([value])) for value in policy.raw]
@@ -107,19 +108,19 @@ def raw_returns(view: View, policy: Policy) -> str:
 
 
 def formats_of(view: View) -> list[str]:
-    """One for each objective, fit for the front; without one, of the policy that there is."""
+    """Return the number format of each objective, fit for the front; for zeros where there is no front."""
     values = view.values if view.front else np.zeros((1, len(view.objectives)))
     return [number_format(column) for column in values.T]
 
 
 def score_of_each(view: View, policy: Policy) -> list[str]:
-    """`−66.1 ±0.4 -steps` for each objective: raw units, with their spread over the evaluation episodes."""
+    """Return `−66.1 ±0.4 -steps` for each objective: mean and standard deviation over the evaluation episodes."""
     each = zip(view.objectives, policy.values, policy.std, formats_of(view), strict=True)
     return [minus(f"{value:{fmt}} ±{std:{fmt}}") + f" {o.unit}" for o, value, std, fmt in each]
 
 
 def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
-    """What choosing a policy would mean: what it rules out, and what the prediction model expects of what is left."""
+    """Say what choosing a policy would mean: what it rules out, and what the prediction model expects of the rest."""
     question = view.question
     if question and not view.choosable(policy.id):
         if policy.id in {each.id for each in view.front}:
@@ -139,18 +140,8 @@ def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
     return f"{ruled_out} The model expects up to {best}."
 
 
-def wanted(view: View, selection: Selection) -> list[int] | None:
-    """The policies that have more of what there should be more of, the least change first; None for all."""
-    if selection.more_of is None:
-        return None
-    reference = view.policy(selection.than) if selection.than is not None else None
-    least = reference.values[selection.more_of] if reference else -np.inf
-    members = sorted(view.front, key=lambda policy: float(policy.values[selection.more_of]))
-    return [policy.id for policy in members if policy.values[selection.more_of] > least]
-
-
 def minus(text: str) -> str:
-    """Numbers with the sign for minus that is as wide as a digit."""
+    """Write numbers with the sign for minus that is as wide as a digit."""
     return re.sub(r"(?<!\w)-(?=\d)", "−", text)
 
 

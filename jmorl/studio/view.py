@@ -1,4 +1,4 @@
-"""What there is to see of a run, as one immutable record that is replaced as a whole.
+"""A run as it is shown: one immutable record that is replaced as a whole.
 
 The thread of the run makes it, the page reads it; neither waits for the other.
 """
@@ -12,6 +12,7 @@ import envs
 from envs.core import Objective
 from jmorl.config import Config, resolve
 from jmorl.decision.protocol import Question
+from jmorl.decision.records import DecisionRecord
 from jmorl.display.text import REASONS
 from jmorl.events import Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
@@ -27,7 +28,7 @@ PERSON = "terminal"  # the config's user whose questions are put on the page
 
 @dataclass(frozen=True, eq=False)
 class Generation:
-    """What is left to see of a generation that is over."""
+    """The record of a generation that is over."""
 
     number: int  # 0: the warm-up
     front: np.ndarray  # [N, M] values of the archive after it
@@ -59,28 +60,28 @@ class View:
 
     @property
     def values(self) -> np.ndarray:  # [N, M]
-        """The front's objective vectors; N may be zero."""
+        """Return the front's objective vectors; N may be zero."""
         return values_of(self.front) if self.front else np.zeros((0, len(self.objectives)))
 
     def policy(self, policy_id: int) -> Policy | None:
-        """A policy that can be looked at, if it is there."""
+        """Return a policy that can be looked at, if it is there."""
         known = (*self.front, *filter(None, (self.previous, self.result)))
         return next((policy for policy in known if policy.id == policy_id), None)
 
     def choosable(self, policy_id: int) -> bool:
-        """Whether a policy may be the answer to the open question."""
+        """Return whether a policy may be the answer to the open question."""
         return self.question is not None and any(policy.id == policy_id for policy in self.question.front)
 
 
 def stored_view(path: Path) -> View:
-    """What a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
+    """Read the view of a run folder; a run in its warm-up has nothing to show yet. Raises as `read_run` does."""
     manifest, config = read_manifest(path), resolve(file=path / "config.toml")
     objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
     nothing = View(path, manifest["run"], config, objectives, (), (), np.full(len(objectives), -np.inf), None, (), None)
     if not (path / "metrics.csv").exists():
         return nothing
     stored = read_run(path)
-    decisions = [record for record in stored.decisions if record.purpose != "enautilus"]
+    decisions = [record for record in stored.decisions if isinstance(record, DecisionRecord)]
     return replace(
         nothing,
         generations=_generations(stored),
@@ -94,29 +95,29 @@ def stored_view(path: Path) -> View:
 
 
 def after(view: View, event: Event, now: float) -> View:
-    """The view when `event` has just happened; `now` is in seconds of the timeline's clock."""
+    """Return the view when `event` has just happened; `now` is in seconds of the timeline's clock."""
     assert view.timeline is not None
     view = replace(view, timeline=view.timeline.after(event, now))
     match event:
-        case Resumed(state):
+        case Resumed(state=state):
             past = tuple(choice for choice in view.choices if choice[0] <= state.generation)
-            view = replace(view, state=state, front=state.archive.members, bounds=state.bounds)
+            view = replace(view, state=state, front=state.archive.members, bounds=event.bounds)
             return replace(view, previous=state.choice, choices=past)
         case GenerationFinished(state):
             front = state.archive.members
             values, metrics = values_of(front), event.front
-            over = Generation(state.generation, values, event.steps, metrics.hypervolume, event.utility.utility_max)
+            over = Generation(state.generation, values, event.steps, metrics.hypervolume, event.utility_max)
             return replace(view, state=state, generations=(*view.generations, over), front=front)
-        case Decided():
-            choices = (*view.choices, (event.question.generation, event.chosen.values))
-            return replace(view, question=None, bounds=event.bounds, previous=event.chosen, choices=choices)
+        case Decided(chosen=Policy() as chosen):
+            choices = (*view.choices, (event.question.generation, chosen.values))
+            return replace(view, question=None, bounds=event.bounds, previous=chosen, choices=choices)
         case RunFinished():
             return replace(view, result=event.chosen, reason=REASONS[event.reason], timeline=None)
     return view
 
 
 def _generations(stored: StoredRun) -> tuple[Generation, ...]:
-    """The fronts are those of all policies evaluated by then."""
+    """Return the generations of a stored run; the front of each is that of all policies evaluated by then."""
     archive, generations = Archive(), []
     metrics = stored.metrics
     for number in range(len(metrics["generation"])):

@@ -170,7 +170,7 @@ def test_another_front_is_refused(front_of, objectives_of, replay):
 
 
 def test_the_question_behind_a_dialogue_is_not_logged(ask):
-    with pytest.raises(ValueError, match="logged as the PointQuestion"):
+    with pytest.raises(ValueError, match="logged as the question it belongs to"):
         decision_record(ask(VALUES, purpose="enautilus"), Answer(10))
 
 
@@ -186,7 +186,7 @@ def without(fields: dict, name: str) -> dict:
     [
         ('{"format": 1, "purp', "is not valid JSON: .* at column"),
         ("[1, 2]", "is not a JSON object"),
-        (STEER | {"format": 2}, "has format 2, newer than the format 1 known here; use a newer jmorl"),
+        (STEER | {"format": 3}, "has format 3, newer than the format 2 known here; use a newer jmorl"),
         (STEER | {"format": 0}, "is not a decision: format: input should be 1"),
         (without(STEER, "purpose"), 'purpose: should be "steer", "final" or "enautilus"'),
         (STEER | {"purpose": "guess"}, 'purpose: should be "steer", "final" or "enautilus"'),

@@ -78,7 +78,7 @@ def test_a_state_of_other_parts_is_named():
 
 
 def test_what_an_environment_raises_is_named_with_its_line():
-    with pytest.raises(NotAsDeclared, match=r"breaks down: AttributeError: .*missing.*\(test_declared.py, line \d+\)"):
+    with pytest.raises(NotAsDeclared, match=r"breaks down: AttributeError: .*missing.*\(test_checks.py, line \d+\)"):
         check_environment(Crashing())
 
 

@@ -7,7 +7,7 @@ import pytest
 from jmorl.config import Config
 from jmorl.learning.moppo import MOPPO, Schedule
 from jmorl.learning.population import Population, TrainingFault
-from jmorl.learning.programs import CompiledPrograms, device_count
+from jmorl.learning.programs import Programs, device_count
 from tests.probes import Faulty, ThreeWays
 
 CONFIG = Config(
@@ -21,7 +21,7 @@ RATE = 3e-4
 
 
 def compiled(environment, config=CONFIG):
-    population = Population(environment, config)
+    population = Population(environment, config.learning)
     population.compile()
     return population
 
@@ -91,19 +91,28 @@ def test_in_float64_an_agent_the_order_and_the_devices_differ_by_rounding_alone(
     config = CONFIG.replace(ppo={"hidden_sizes": (4,)})
     order = np.array([2, 0, 3, 1])
     with jax.enable_x64(True):
-        programs, keys = CompiledPrograms(ThreeWays(), config), jax.random.split(jax.random.key(1), 4)
+        programs, keys = Programs(ThreeWays(), config.learning), jax.random.split(jax.random.key(1), 4)
         start = jax.tree.map(in_float64, programs.initialize(jax.random.split(jax.random.key(0), 4)))
         together, _ = programs.train(start, WEIGHTS, keys, schedule)
         permuted, _ = programs.train(agent(start, order), WEIGHTS[order], keys[order], schedule)
         alone = jax.jit(programs.moppo.train)
         singles = [alone(agent(start, index), WEIGHTS[index], keys[index], schedule)[0] for index in range(4)]
         monkeypatch.setattr("jmorl.learning.programs.device_count", lambda agents, available: 1)
-        on_one_device, _ = CompiledPrograms(ThreeWays(), config).train(start, WEIGHTS, keys, schedule)
+        on_one_device, _ = Programs(ThreeWays(), config.learning).train(start, WEIGHTS, keys, schedule)
     assert {leaf.dtype for leaf in jax.tree.leaves(together.parameters)} == {np.dtype(np.float64)}
     for index, single in enumerate(singles):
         assert_close(agent(together, index), single, 1e-10)
     assert_close(agent(together, order), permuted, 1e-10)
     assert_close(together, on_one_device, 1e-10)
+
+
+def test_populations_of_one_environment_and_one_config_share_their_programs():
+    environment = ThreeWays()
+    first = Population(environment, CONFIG.learning)
+    assert Population(environment, CONFIG.replace(seed=2, user="B").learning).programs is first.programs
+    assert Population(environment, CONFIG.replace(ppo={"epochs": 3}).learning).programs is not first.programs
+    # Another instance may have other options under the same id.
+    assert Population(ThreeWays(), CONFIG.learning).programs is not first.programs
 
 
 def in_float64(leaf):
@@ -131,7 +140,7 @@ def test_after_compiling_nothing_is_traced_or_compiled_again(population, start):
     assert [event for event in events if "compile" in event], "the listener must see a compilation"
 
 
-def test_evaluation_is_repeatable_and_leaves_the_learner_alone(population, start):
+def test_evaluation_is_repeatable_and_leaves_train_states_alone(population, start):
     keys = jax.random.split(jax.random.key(9), 2)
     before = jax.tree.map(np.copy, start)
     first, second = population.evaluate(start, keys), population.evaluate(start, keys)
@@ -158,7 +167,7 @@ def test_numbers_that_are_not_finite_are_found_in_their_iteration_and_named(wher
     assert str(error.value).count("agent") == 4
 
 
-def test_a_broken_learner_is_found_and_named(population, start):
+def test_a_broken_train_state_is_found_and_named(population, start):
     broken = jax.tree.map(np.copy, start)
     broken.parameters["critic"]["params"]["Dense_0"]["bias"][2] = np.nan
     with pytest.raises(TrainingFault, match="^agent 2: loss is not finite in iteration 1$"):

@@ -1,31 +1,33 @@
-"""What was to be shown in raw units, and what explains a difference in paper units: by rule from the numbers."""
+"""The acceptance criterion in raw units, and what explains a difference in paper units: by rule from the numbers."""
 
-from jmorl.paper.acceptance import drift_told, explanations, raw_bar
+from jmorl.paper.acceptance import acceptance_verdict, drift_told, explanations
 from jmorl.paper.data import published
 from tests.paper.test_verdicts import row
 
 TABLE = published().tables["table1"]
 
 
-def test_a_bar_that_is_met_says_how_surely():
-    text = raw_bar(TABLE, [row("interactive", (1, 1, 1)), row("pgmorl", (3, 3, 4))])
+def test_a_criterion_that_is_met_says_how_surely():
+    text = acceptance_verdict(TABLE, [row("interactive", (1, 1, 1)), row("pgmorl", (3, 3, 4))])
     assert text.startswith(
         "Target B: met, in steps clearly. The interactive method succeeds in 3 of 3 runs, PGMORL in 3"
     )
     assert "best published row in 5 of 5" in text and "candidates" not in text and "can be continued" not in text
-    assert "met, in steps not clearly." in raw_bar(TABLE, [row("interactive", (1, 1, 1)), row("pgmorl", (1, 1, 4))])
+    assert "met, in steps not clearly." in acceptance_verdict(
+        TABLE, [row("interactive", (1, 1, 1)), row("pgmorl", (1, 1, 4))]
+    )
 
 
-def test_a_bar_that_is_not_met_shows_the_mechanism():
+def test_a_criterion_that_is_not_met_shows_the_mechanism():
     rows = [row("interactive", (None, None, 1), candidates=1), row("pgmorl", (1, 1, 1))]
-    text = raw_bar(TABLE, rows)
+    text = acceptance_verdict(TABLE, rows)
     assert "not met: it succeeds less often than PGMORL and it succeeds less often than the best published row and it "
     assert "does not need fewer steps." in text
     assert (
         "In its runs that never arrive, policies that can be continued number 1 (median), 100% of the generations"
         in text
     )
-    late = raw_bar(TABLE, [row("interactive", (2, 2, 2)), row("pgmorl", (1, 1, 1))])
+    late = acceptance_verdict(TABLE, [row("interactive", (2, 2, 2)), row("pgmorl", (1, 1, 1))])
     assert (
         "not met: it does not need fewer steps." in late
         and "In its runs, policies that can be continued number 3" in late
@@ -34,8 +36,10 @@ def test_a_bar_that_is_not_met_shows_the_mechanism():
 
 def test_for_target_a_steps_are_not_asked_for():
     rows = [row("interactive", (2, 2, 2), target="A"), row("pgmorl", (1, 1, 1), target="A")]
-    assert "Target A: met. " in raw_bar(TABLE, rows) and "not asked for here" in raw_bar(TABLE, rows)
-    assert "missing" in raw_bar(TABLE, rows[1:])
+    assert "Target A: met. " in acceptance_verdict(TABLE, rows) and "not asked for here" in acceptance_verdict(
+        TABLE, rows
+    )
+    assert "missing" in acceptance_verdict(TABLE, rows[1:])
 
 
 def test_more_successes_than_published_are_owed_to_drift_if_no_trained_policy_would_do():

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jmorl.experiments.record import record_of
+from jmorl.experiments.targets import reached
 from jmorl.paper.analysis import (
     buffer_utility,
     finals,
@@ -13,29 +15,11 @@ from jmorl.paper.analysis import (
     non_dominated_or_equal,
     offspring_utility,
     pooled_front,
-    reached,
     seconds_within,
 )
-from jmorl.paper.mechanism import mechanism, waiting
-from jmorl.paper.record import record_of
 from jmorl.storage.stored_run import read_run
-from tests.paper.made import ITERATION, record
+from tests.experiments.made import ITERATION, record
 from tests.resuming import train
-
-
-def test_a_target_is_reached_by_one_policy_in_every_objective():
-    run = record([[(-90, -50)], [(-70, -60), (-95, -40)], [(-80, -45), (-75, -48)]])
-    hit = reached(run, (-80, -50))
-    assert (hit.generation, hit.steps, hit.seconds) == (2, 30 * ITERATION, 12.0)
-    assert hit.policy == 4  # clears by (5, 2), where the other clears by (0, 5)
-    assert reached(run, (-69, -45)) is None
-    assert reached(run, (-90, -50)).generation == 0
-
-
-def test_what_is_reached_after_the_cap_does_not_count():
-    run = record([[(-90, -50)], [(-70, -60)]])
-    assert reached(run, (-75, -65), cap=20 * ITERATION).generation == 1
-    assert reached(run, (-75, -65), cap=20 * ITERATION - 1) is None
 
 
 def test_utilities_are_of_archive_offspring_and_buffer():
@@ -56,6 +40,11 @@ def test_bounds_and_untrained_policies_do_not_touch_the_mean_of_the_offspring():
     assert np.isnan(buffer_utility(nobody, (0.5, 0.5), 20 * ITERATION, bounded=True)[1])
 
 
+def test_the_time_within_a_smaller_budget_is_that_of_its_generations():
+    run = record([[(-90, -50)], [(-70, -60)], [(-70, -50)]])
+    assert seconds_within(run, 20 * ITERATION) == 8.0
+
+
 def test_final_policies_are_filtered_together():
     pgmorl = [record([[(-100, -20), (-70, -60)]]), record([[(-85, -40), (-99, -21)]])]
     ours = [record([[(-84, -39)]]), record([[(-71, -61)]])]
@@ -73,32 +62,8 @@ def test_equal_policies_do_not_dominate_each_other():
     assert non_dominated_or_equal(values).tolist() == [True, True, False, True]
 
 
-def test_the_mechanism_counts_repeats_and_gains():
-    run = record(
-        [[(0.0, 0.0), (10.0, -10.0)], [(5.0, 0.0)], [(5.0, 0.0)]],
-        parents={2: (0, (2.0, 2.0))},
-        questions=[(1, 0), (2, 0), (3, 2)],
-        candidates=1,
-    )
-    found = mechanism([run])
-    assert (found.candidates, found.alone, found.repeated) == (1, 1.0, 0.5)
-    front = np.array([[10.0, -10.0], [5.0, 0.0]])
-    span = np.ptp(front, axis=0)
-    assert found.predicted_gain == pytest.approx(np.mean(2 / span))
-    assert found.realised_gain == pytest.approx(np.mean([5, 0] / span))
-    asked = waiting([run])
-    assert (asked.questions, asked.before_first, asked.between) == (3, 4.0, 4.0)
-    assert seconds_within(run, 20 * ITERATION) == 8.0
-
-
-def test_who_is_asked_at_the_end_waits_for_the_whole_run():
-    run = record([[(-90, -50)], [(-70, -60)], [(-70, -50)]], questions=[(3, 2)])
-    asked = waiting([run])
-    assert (asked.questions, asked.before_first) == (1, 12.0) and np.isnan(asked.between)
-
-
 @pytest.fixture(scope="module")
-def pgmorl(compiled_once, small_config, tmp_path_factory):
+def pgmorl(small_config, tmp_path_factory):
     """A function of a config, that makes a PGMORL run of three objectives with it."""
     folder = tmp_path_factory.mktemp("runs")
 

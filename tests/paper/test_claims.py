@@ -8,7 +8,7 @@ from jmorl.paper.claims import conclusion, curve_checks, finals_checks, finals_t
 from jmorl.paper.data import Claims
 from jmorl.paper.plan import SHORTER
 from jmorl.paper.results import Curves
-from tests.paper.made import ITERATION, record
+from tests.experiments.made import ITERATION, record
 
 SEEDS = (1, 7, 10)
 STEPS = np.arange(1, 5) * 240_000

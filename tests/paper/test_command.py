@@ -2,18 +2,15 @@
 
 import re
 import struct
-import threading
 from collections import Counter
 
 import numpy as np
 import pytest
 
 from jmorl.cli import main
-from jmorl.events import GenerationFinished
+from jmorl.experiments.record import read_record
 from jmorl.learning.population import Population, TrainingFault
 from jmorl.paper.plan import ITEMS, Plan
-from jmorl.paper.record import read_record
-from jmorl.paper.runner import Places, groups, make, missing
 
 CAR_ITEMS = "table1,fig5,fig6,fig9,fig10"
 
@@ -92,50 +89,6 @@ def test_a_second_time_makes_nothing_and_writes_the_same_report(out, capsys):
     assert {path: path.read_bytes() for path in before} == before
 
 
-def test_a_lost_record_comes_from_the_run_folder_without_training(out):
-    cell = Plan(quick=True).cells(ITEMS["fig5"], "raw")[0]
-    places = Places(out / "records", out / "work")
-    before = places.record(cell).read_bytes()
-    places.record(cell).unlink()
-    events = []
-    make([cell], places, lambda _, event: events.append(event))
-    assert not events and places.record(cell).read_bytes() == before
-
-
-@pytest.mark.parametrize("units", ["raw", "paper"])
-def test_an_interrupted_run_goes_on_to_the_same_record(out, tmp_path, units):
-    cell = Plan(quick=True).cells(ITEMS["fig5"], units)[0]
-    places = Places(tmp_path / "records", tmp_path / "work")
-
-    class Enough(Exception):
-        pass
-
-    def stop(_, event):
-        if isinstance(event, GenerationFinished) and event.state.generation == 1:
-            raise Enough
-
-    with pytest.raises(Enough):
-        make([cell], places, stop)
-    assert missing([cell], places) == [cell]
-    generations = []
-    (resumed,) = make(
-        [cell], places, lambda _, e: isinstance(e, GenerationFinished) and generations.append(e.state.generation)
-    )
-    assert generations == [2]
-    expected = read_record(Places(out / "records", out / "work").record(cell))
-    assert resumed.policies == expected.policies and resumed.questions == expected.questions
-    assert [each.front for each in resumed.generations] == [each.front for each in expected.generations]
-    assert [each.buffer for each in resumed.generations] == [each.buffer for each in expected.generations]
-
-
-def test_a_run_folder_of_other_settings_is_started_anew(tmp_path):
-    first, other = (Plan(quick=True, seeds=(seed,)).cells(ITEMS["fig5"], "raw")[0] for seed in (3, 4))
-    places = Places(tmp_path / "records", tmp_path / "work")
-    make([first], places, lambda *_: None)
-    (places.work / first.key).rename(places.work / other.key)
-    assert make([other], places, lambda *_: None)[0].digest == other.config.digest()
-
-
 @pytest.fixture(scope="module")
 def in_threes(tmp_path_factory):
     """Table 1 in raw units, three runs in one program."""
@@ -162,35 +115,6 @@ def test_the_report_counts_their_time_once_and_says_nothing_of_waiting(in_threes
     text = (in_threes / "REPORT.md").read_text()
     assert "8 runs were made several at a time in one program" in text and not re.search(r"\bnan\b|None", text)
     assert "| B | interactive |  | 20 min 31 s | " in text
-
-
-def test_a_run_that_is_broken_off_leaves_those_beside_it_alone(tmp_path):
-    cells = Plan(quick=True).cells(ITEMS["fig5"], "raw")[:2]
-    places = Places(tmp_path / "records", tmp_path / "work")
-
-    def stop(cell, event):
-        if cell == cells[0]:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make(cells, places, stop)
-    assert missing(cells, places) == [cells[0]]
-
-
-def test_a_run_alone_is_made_in_the_callers_thread(tmp_path):
-    """So an interruption reaches it, and somebody's own decision maker need not know of threads."""
-    threads = set()
-    places = Places(tmp_path / "records", tmp_path / "work")
-    cells = Plan(quick=True).cells(ITEMS["fig5"], "raw")[:1]
-    make(cells, places, lambda *_: threads.add(threading.current_thread()))
-    assert threads == {threading.current_thread()}
-
-
-def test_only_runs_of_one_shape_share_a_program():
-    plan = Plan(quick=True)
-    raw, paper = (plan.cells(ITEMS["fig5"], units) for units in ("raw", "paper"))
-    assert list(groups([*raw[:3], *paper[:1]], 2)) == [raw[:2], raw[2:3], paper[:1]]
-    assert list(groups(raw, 1)) == [[cell] for cell in raw]
 
 
 def test_the_report_says_what_is_missing(out, tmp_path, capsys):

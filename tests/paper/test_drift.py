@@ -2,10 +2,19 @@
 
 import numpy as np
 
-from jmorl.paper.analysis import reached
-from jmorl.paper.drift import common_generation, in_warm_up_units, sigma_at, untrained
-from jmorl.paper.results import target_row
-from tests.paper.made import ITERATION, record
+from jmorl.experiments.targets import reached, target_row
+from jmorl.paper.drift import (
+    at_the_start,
+    by_untrained,
+    common_generation,
+    drifted,
+    in_warm_up_units,
+    prevented,
+    reached_without_drift,
+    sigma_at,
+    untrained,
+)
+from tests.experiments.made import ITERATION, record
 
 SIGMA = [(40.0, 20.0), (80.0, 20.0)]
 CAP = 50 * ITERATION
@@ -22,9 +31,9 @@ def test_a_score_in_the_units_after_the_warm_up_is_the_return_over_that_sigma():
 def test_without_returns_a_score_is_of_the_sigma_at_the_end_of_its_generation():
     run = record([[(-1.5, -1.5)], [(-0.9, -0.9)]], sigma=SIGMA)
     np.testing.assert_allclose(in_warm_up_units(run), [(-1.5, -1.5), (-1.8, -0.9)])
-    assert not reached(run, TARGET).without_drift
-    assert reached(run, (-1.9, -1)).without_drift
-    assert reached(record([[(-1.0, -1.0)]]), TARGET).without_drift
+    assert not reached_without_drift(run, TARGET, 1)
+    assert reached_without_drift(run, (-1.9, -1), 1) and not reached_without_drift(run, (-1.9, -1), 0)
+    assert reached_without_drift(record([[(-1.0, -1.0)]]), TARGET, 0)
 
 
 def test_any_policy_found_so_far_shows_that_units_did_not_do_it():
@@ -32,7 +41,8 @@ def test_any_policy_found_so_far_shows_that_units_did_not_do_it():
     born = [[(-1.5, -1.5)], [(-0.95, -1.0), (-0.9, -0.8)]]
     run = record(born, sigma=SIGMA, discounted=[(-60, -30), (-38, -20), (-72, -16)])
     hit = reached(run, TARGET)
-    assert hit.policy == 2 and run.generations[1].front == (2,) and hit.without_drift
+    assert hit.policy == 2 and run.generations[1].front == (2,)
+    assert reached_without_drift(run, TARGET, hit.generation)
 
 
 def test_an_untrained_success_is_owed_to_units_whatever_they_did():
@@ -40,16 +50,16 @@ def test_an_untrained_success_is_owed_to_units_whatever_they_did():
     run = record([start_up + [(-2.0, -2.0)] * 6], sigma=SIGMA[:1], discounted=[(0, 0)] * 6 + [(-80, -40)] * 6)
     assert untrained(run).tolist() == [True] * 6 + [False] * 6
     row = target_row("A", TARGET, "interactive", (1,), [run], CAP)
-    assert (row.times.successes, row.drifted, row.untrained, row.at_the_start) == (1, 1, 1, 1)
+    assert (row.times.successes, drifted(row), by_untrained(row), at_the_start(row)) == (1, 1, 1, 1)
     trained = record([[(-0.5, -0.5)] * 6], sigma=SIGMA[:1])
     row = target_row("A", TARGET, "interactive", (1,), [trained], CAP)
-    assert (row.times.successes, row.drifted, row.untrained, row.at_the_start) == (1, 0, 0, 1)
+    assert (row.times.successes, drifted(row), by_untrained(row), at_the_start(row)) == (1, 0, 0, 1)
 
 
 def test_units_can_hide_a_success_too():
     run = record([[(-1.5, -1.5)], [(-1.2, -1.2)]], sigma=[(80, 80), (40, 40)], discounted=[(-120, -120), (-60, -60)])
     row = target_row("A", TARGET, "pgmorl", (1,), [run], CAP)
-    assert (row.times.successes, row.prevented) == (0, 1)
+    assert (row.times.successes, prevented(row)) == (0, 1)
 
 
 def test_sigma_is_compared_after_equally_many_generations():

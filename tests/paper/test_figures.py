@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from jmorl.experiments.targets import target_row
 from jmorl.paper.figures import curves_figure, finals_figure, stacked, targets_figure
 from jmorl.paper.plan import ITEMS
-from jmorl.paper.results import Curves, target_row
-from tests.paper.made import ITERATION, record
+from jmorl.paper.results import Curves
+from tests.experiments.made import ITERATION, record
 
 SEEDS = (1, 7, 10)
 

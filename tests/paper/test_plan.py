@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from jmorl.arguments import PAPER_ITEMS
+from jmorl.experiments.cells import Places, distinct, missing
+from jmorl.experiments.record import read_record
 from jmorl.paper.claims import CURVE_STATEMENTS, FINALS_STATEMENTS
 from jmorl.paper.data import honest, published
+from jmorl.paper.pilots import proposals
 from jmorl.paper.plan import (
     CAR,
     CHEETAH,
@@ -19,11 +22,7 @@ from jmorl.paper.plan import (
     USER_SEEDS,
     USER_STEPS,
     Plan,
-    distinct,
 )
-from jmorl.paper.record import read_record
-from jmorl.paper.runner import Places, missing
-from jmorl.paper.targets import proposals
 
 UNITS = ("raw", "paper")
 FULL, QUICK = Plan(), Plan(quick=True)
@@ -36,12 +35,12 @@ def test_a_key_names_one_config_and_a_config_has_one_key(plan):
     configs = {}
     for cell in cells:
         assert configs.setdefault(cell.key, cell.config) == cell.config
-    assert len({config.digest() for config in configs.values()}) == len(configs) == len(distinct(cells))
+    assert len({config.identity() for config in configs.values()}) == len(configs) == len(distinct(cells))
 
 
 def test_full_and_quick_runs_are_never_taken_for_each_other():
     digests = [
-        {cell.config.digest() for item, u in EVERYTHING for cell in plan.cells(item, u)} for plan in (FULL, QUICK)
+        {cell.config.identity() for item, u in EVERYTHING for cell in plan.cells(item, u)} for plan in (FULL, QUICK)
     ]
     assert not digests[0] & digests[1]
 
@@ -101,19 +100,18 @@ def test_in_raw_units_the_settings_are_this_programs_own():
 
 
 def test_the_committed_records_are_of_the_plans_cells():
-    """Digests of raw cells stay what they were, so that no finished run is made again."""
+    """Their settings are still those of the plan, so that no finished run is made again."""
     places = Places(Path("benchmarks/paper/records"), Path("nowhere"))
-    cells = distinct(
-        cell for name in ("table1", "fig5", "fig6", "fig9", "fig10") for cell in FULL.cells(ITEMS[name], "raw")
-    )
-    assert len(cells) == 41 and missing(cells, places) == []
+    cells = distinct([*(cell for item, u in EVERYTHING for cell in FULL.cells(item, u)), *FULL.pilots(CHEETAH)])
+    assert {places.record(cell) for cell in cells} == set(places.records.iterdir())
+    assert len(cells) == 145 and missing(cells, places) == []
 
 
 def test_pgmorl_has_a_second_row_with_the_papers_warm_up_on_halfcheetah_made_last():
     for name, seeds in (("table2", QUICK.seeds_of(ITEMS["table2"])), ("fig7", USER_SEEDS), ("fig8", USER_SEEDS)):
         plan = QUICK if name == "table2" else FULL  # its targets may not be fixed yet
         cells = plan.cells(ITEMS[name], "raw")
-        later = [cell for cell in cells if cell.later]
+        later = plan.later(ITEMS[name], "raw")
         assert cells[-len(later) :] == later and [cell.config.seed for cell in later] == list(seeds)
         assert all(cell.config.method == "pgmorl" and SHORTER in cell.key for cell in later)
     shorter = FULL.pgmorl(ITEMS["fig7"], "raw", 1, SHORTER).config
@@ -121,8 +119,8 @@ def test_pgmorl_has_a_second_row_with_the_papers_warm_up_on_halfcheetah_made_las
     own = FULL.pgmorl(ITEMS["fig7"], "raw", 1).config
     assert own.population.warmup_iterations == 120 and shorter == own.replace(population={"warmup_iterations": 40})
     others = [("fig5", "raw"), ("fig7", "paper"), ("fig11", "raw")]
-    assert not any(cell.later for name, units in others for cell in FULL.cells(ITEMS[name], units))
-    assert not any(cell.later for cell in FULL.pilots(CHEETAH))
+    assert not any(FULL.later(ITEMS[name], units) for name, units in others)
+    assert not any(SHORTER in cell.key for cell in FULL.pilots(CHEETAH))
 
 
 def test_seeds_are_the_papers_and_pilots_have_others():

@@ -1,10 +1,11 @@
 """Sentences on tables follow from numbers: other numbers, other sentences."""
 
+from jmorl.experiments.targets import target_row
 from jmorl.paper.data import published
 from jmorl.paper.plan import SHORTER
-from jmorl.paper.results import pair_of, target_row
+from jmorl.paper.results import pair_of
 from jmorl.paper.verdicts import ahead, table_verdict, target_verdict
-from tests.paper.made import ITERATION, record
+from tests.experiments.made import ITERATION, record
 
 TABLE = published().tables["table1"]
 TARGET, BUDGET = (-80.0, -50.0), 50 * ITERATION

@@ -1,6 +1,7 @@
 """Small made-up runs, as events and as what their folder tells."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ from jmorl.config import resolve
 from jmorl.decision.protocol import Answer, Question
 from jmorl.decision.records import decision_record
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, RunFinished, Seconds
+from jmorl.methods.pgmorl import PGMORLState
 from jmorl.search.bounds import lower_bounds
 from jmorl.search.buffer import PerformanceBuffer
-from jmorl.search.metrics import PredictionMetrics, UtilityMetrics, front_metrics
+from jmorl.search.metrics import front_metrics
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Records
 from jmorl.search.weights import simplex_grid
@@ -47,11 +49,12 @@ def events_of(
     """A whole run, whose policies approach a concave front; the first `outliers` are hopeless in one objective."""
     generator = np.random.default_rng(7)
     described = OBJECTIVES[:objectives]
-    state = RunState(PerformanceBuffer(100, 4), Records.empty(objectives), np.full(objectives, -np.inf))
+    unbounded = np.full(objectives, -np.inf)
+    state = RunState(PGMORLState(PerformanceBuffer(100, 4), Records.empty(objectives), unbounded))
     events: list[Event] = [Compiled(3.21, 2)]
     policies: list[Policy] = []
     for generation in range(generations + 1):
-        bounds, choice = state.bounds, state.choice
+        bounds, choice = state.search.bounds, state.choice
         if generation and interactive:
             decided = _decided("steer", generation, state, described)
             events.append(decided)
@@ -61,9 +64,7 @@ def events_of(
         )
         policies += offspring
         state = RunState(
-            state.buffer,
-            state.records,
-            bounds,
+            replace(state.search, bounds=bounds),
             state.archive.offer(offspring),
             choice=choice,
             generation=generation,
@@ -71,7 +72,7 @@ def events_of(
             evaluation_steps=9_000 * (generation + 1),
             policies=len(policies),
         )
-        events.append(_finished(state, offspring, has_utility))
+        events.append(_finished(state, offspring, has_utility, interactive))
     decided = _decided("final", generations + 1, state, described)
     return [*events, decided, RunFinished(state, decided.chosen, "budget")]
 
@@ -88,7 +89,7 @@ def run_of(finished: bool = True, **kinds: object) -> StoredRun:
         path=Path("runs/made-up"),
         config=resolve(overrides={"method": method, "user": "A" if kinds.get("has_utility", True) else "terminal"}),
         manifest={"device": {"kind": "cpu", "platform": "cpu", "count": 2}},
-        objectives=OBJECTIVES[: len(generations[0].state.bounds)],
+        objectives=OBJECTIVES[: len(generations[0].bounds)],
         metrics={name: np.array([row[name] for row in rows], float) for name in rows[0]},
         policies=tuple(policy for event in generations for policy in event.offspring),
         front=generations[-1].state.archive.members,
@@ -117,11 +118,13 @@ def _policy(generator: np.random.Generator, number: int, generation: int, object
     )
 
 
-def _finished(state: RunState, offspring: tuple[Policy, ...], has_utility: bool) -> GenerationFinished:
+def _finished(
+    state: RunState, offspring: tuple[Policy, ...], has_utility: bool, interactive: bool
+) -> GenerationFinished:
     utility = state.archive.values.mean(axis=1)
     within_bounds = None if state.generation == 4 else float(utility.mean() - 1)
     mean = float(utility.mean() - 3)
-    objectives = len(state.bounds)
+    objectives = len(state.search.bounds)
     return GenerationFinished(
         state,
         offspring,
@@ -131,10 +134,15 @@ def _finished(state: RunState, offspring: tuple[Policy, ...], has_utility: bool)
         training={"policy_loss": -0.01, "value_loss": 0.2, "entropy": 0.5, "approximate_kl": 0.01},
         steps_per_second=23_456.7 + 100 * state.generation,
         front=front_metrics(state.archive.values, -2 * SCALES[:objectives], simplex_grid(objectives, 10)),
-        utility=UtilityMetrics(float(utility.max()), mean, within_bounds)
-        if has_utility
-        else UtilityMetrics(None, None, None),
-        prediction=PredictionMetrics(0.02, 0.08) if state.generation else PredictionMetrics(None, None),
+        utility_max=float(utility.max()) if has_utility else None,
+        search={
+            "utility_mean": mean if has_utility else None,
+            "utility_mean_within_bounds": within_bounds if has_utility else None,
+            "prediction_error": 0.02 if state.generation else None,
+            "realized_change": 0.08 if state.generation else None,
+        },
+        bounds=state.search.bounds,
+        generations_to_question=0 if interactive else None,
     )
 
 
@@ -142,15 +150,15 @@ def _decided(purpose: str, generation: int, state: RunState, objectives: tuple[O
     front = state.archive.members
     chosen = front[int(np.argmax(values_of(front).mean(axis=1)))]
     previous = state.choice.id if state.choice else None
-    question = Question(purpose, generation, objectives, front, state.bounds, previous)
+    question = Question(purpose, generation, objectives, front, state.search.bounds, previous)
     bounds = lower_bounds(chosen.values, 0.1, np.ptp(state.archive.values, axis=0))
-    return Decided(question, Answer(chosen.id), chosen, bounds if purpose == "steer" else state.bounds, 0.01)
+    return Decided(question, Answer(chosen.id), chosen, bounds if purpose == "steer" else state.search.bounds, 1, 0.01)
 
 
 def _row(event: GenerationFinished) -> dict[str, float | None]:
     """A row of the metrics file, None where a cell is empty."""
     names = [objective.name for objective in OBJECTIVES]
-    bounds = [value if np.isfinite(value) else None for value in event.state.bounds]
+    bounds = [value if np.isfinite(value) else None for value in event.bounds]
     return {
         "generation": event.state.generation,
         "steps": event.steps,
@@ -160,6 +168,6 @@ def _row(event: GenerationFinished) -> dict[str, float | None]:
         "candidates": event.candidates,
         **{f"bound_{name}": value for name, value in zip(names, bounds, strict=False)},
         **vars(event.front),
-        **vars(event.utility),
-        **vars(event.prediction),
+        "utility_max": event.utility_max,
+        **event.search,
     }

@@ -56,7 +56,7 @@ def test_the_phases_of_an_interactive_run(make_events):
 
 def test_a_resumed_run_goes_on_where_it_was(make_events):
     compiled, *_, finished, decided = make_events(generations=3)[:5]
-    after = timelines([compiled, Resumed(finished.state, finished.steps), decided], config_of())
+    after = timelines([compiled, Resumed(finished.state, finished.steps, finished.bounds, 0), decided], config_of())
     assert [(each.phase, each.generation) for each in after] == [("warm-up", 0), ("question", 2), ("generation", 2)]
     assert [each.steps(100.0) for each in after] == [0, finished.steps, finished.steps]
 
@@ -86,7 +86,7 @@ def test_silent_generations_put_the_question_off(make_events):
     from dataclasses import replace
 
     events = make_events()[:3]
-    events[2] = replace(events[2], answer=replace(events[2].answer, generations=3))
+    events[2] = replace(events[2], answer=replace(events[2].answer, generations=3), generations_to_question=3)
     *_, timeline = timelines(events, config_of())
     assert timeline.seconds_to_question(6.0) == pytest.approx(30.0)
     # But the end of the run is a question, too.

@@ -45,7 +45,9 @@ def test_there_is_a_line_for_every_event_and_the_result_as_a_table(make_events):
 
 def test_a_resumed_run_says_where_it_goes_on(make_events, capsys):
     events = make_events()
-    warm_up, later = (Resumed(finished.state, finished.steps) for finished in (events[1], events[5]))
+    warm_up, later = (
+        Resumed(finished.state, finished.steps, finished.bounds, 0) for finished in (events[1], events[5])
+    )
     assert shown("lines", [warm_up]) == "resumed after warm-up, with a front of 4\n"
     assert shown("lines", [later]).startswith("resumed after generation 2 of 10, with a front of ")
     assert "choice for generation 3" in shown("live", [events[0], later])
@@ -60,7 +62,7 @@ def test_a_choice_is_said_with_values_and_bounds(make_events):
     words = "policy 2 (time -201, fuel -91.29) of 4 shown"
     bounds = f"bounds time ≥ {time:.0f}, fuel ≥ {fuel:.2f}"
     assert f"choice for generation 1: {words}; {bounds}\n" in shown("lines", [decided])
-    for_long = replace(decided, answer=replace(decided.answer, generations=3))
+    for_long = replace(decided, generations_to_question=3)
     assert f"{words}; {bounds}, no question for 3 generations\n" in shown("lines", [for_long])
     enough = replace(decided, answer=replace(decided.answer, stop=True))
     assert f"{words}, and stop\n" in shown("lines", [enough])

@@ -6,6 +6,8 @@ import pytest
 
 import envs
 from jmorl.learning.moppo import MOPPO
+from jmorl.loop import make_method
+from jmorl.methods.pgmorl import PGMORLState
 from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
@@ -17,6 +19,11 @@ from jmorl.units import RunningUnits
 @pytest.fixture(scope="package")
 def environment(small_config):
     return envs.make(small_config.env)
+
+
+@pytest.fixture(scope="package")
+def method(small_config, environment):
+    return make_method(small_config, environment)
 
 
 @pytest.fixture(scope="package")
@@ -54,14 +61,16 @@ def make_state(make_policy, small_config):
         policies = [make_policy(number) for number in range(4 * generation + 4)]
         search = small_config.search
         return RunState(
-            buffer=PerformanceBuffer(search.buffer_bins, search.buffer_size, tuple(policies[1:])),
-            records=Records(*generator.normal(size=(3, 4 * generation, 3))),
-            bounds=generator.normal(size=3) if generation else np.full(3, -np.inf),
+            search=PGMORLState(
+                buffer=PerformanceBuffer(search.buffer_bins, search.buffer_size, tuple(policies[1:])),
+                records=Records(*generator.normal(size=(3, 4 * generation, 3))),
+                bounds=generator.normal(size=3) if generation else np.full(3, -np.inf),
+                silent_generations=generation,
+            ),
             archive=Archive((policies[3], policies[0], policies[-1])),
             units=RunningUnits(*generator.normal(size=(4, 3))),
             reference_point=generator.normal(size=3),
             choice=policies[2] if generation else None,
-            silent_generations=generation,
             generation=generation,
             iterations=10 * generation,
             evaluation_steps=2**40 + generation,

@@ -21,16 +21,16 @@ from jmorl.storage.checkpoints import (
 )
 from jmorl.storage.serialization import pack, unpack
 from jmorl.storage.versions import NewerFormat
-from tests.storage.test_packing import assert_same
+from tests.storage.test_serialization import assert_same
 
 LOGS = {"metrics.csv": "generation,steps\r\n0,17\r\n", "decisions.jsonl": "", "policies.csv": "größer\r\n"}
 
 
 @pytest.fixture
-def written(make_state, tmp_path):
+def written(make_state, method, tmp_path):
     """A folder with the checkpoint of generation 1, and the state in it."""
     state = make_state(1)
-    write_checkpoint(tmp_path, Checkpoint(1, "some-run", pack(state), LOGS))
+    write_checkpoint(tmp_path, Checkpoint(1, "some-run", pack(state, method), LOGS))
     return tmp_path, state
 
 
@@ -104,9 +104,9 @@ def test_a_newer_format_is_refused_with_the_version_that_wrote_it(written):
         read_checkpoint(written[0], 1)
 
 
-def test_nothing_is_seen_of_a_checkpoint_that_fails_at_any_step(make_state, tmp_path, monkeypatch):
+def test_nothing_is_seen_of_a_checkpoint_that_fails_at_any_step(make_state, method, tmp_path, monkeypatch):
     """Whatever call fails, the earlier checkpoint stands and nothing else is there."""
-    write_checkpoint(tmp_path, Checkpoint(1, "run", pack(make_state(1)), LOGS))
+    write_checkpoint(tmp_path, Checkpoint(1, "run", pack(make_state(1), method), LOGS))
 
     def full(*arguments, **keywords):
         raise OSError(28, "No space left on device")
@@ -122,17 +122,17 @@ def test_nothing_is_seen_of_a_checkpoint_that_fails_at_any_step(make_state, tmp_
         with monkeypatch.context() as patch:
             patch.setattr(place, name, full)
             with pytest.raises(OSError, match="No space left"):
-                write_checkpoint(tmp_path, Checkpoint(2, "run", pack(make_state(2)), LOGS))
+                write_checkpoint(tmp_path, Checkpoint(2, "run", pack(make_state(2), method), LOGS))
         assert [path.name for path in tmp_path.iterdir()] == ["00001"], name
     read_checkpoint(tmp_path, 1)
 
 
-def test_a_failure_in_the_background_is_raised_by_the_next_call_and_says_what(make_state, tmp_path, monkeypatch):
+def test_a_failure_in_the_background_is_raised_by_the_next_call(make_state, method, tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError(28, "No space left on device")
 
     for call in (lambda writer: writer.wait(), lambda writer: writer.save(make_state(3), LOGS)):
-        writer = CheckpointWriter(tmp_path, "run", keep=2)
+        writer = CheckpointWriter(tmp_path, "run", 2, method)
         with monkeypatch.context() as patch:
             patch.setattr(checkpoints, "_write_arrays", full)
             writer.save(make_state(2), LOGS)
@@ -142,16 +142,16 @@ def test_a_failure_in_the_background_is_raised_by_the_next_call_and_says_what(ma
 
 
 @pytest.mark.parametrize("keep", [1, 3])
-def test_the_last_ones_are_kept(make_state, tmp_path, keep):
-    writer = CheckpointWriter(tmp_path, "run", keep)
+def test_the_last_ones_are_kept(make_state, method, tmp_path, keep):
+    writer = CheckpointWriter(tmp_path, "run", keep, method)
     for generation in range(5):
         writer.save(make_state(generation), LOGS)
     writer.close()
     assert stored_generations(tmp_path) == list(range(5))[-keep:]
 
 
-def test_none_is_deleted_before_the_next_is_whole(make_state, tmp_path, monkeypatch):
-    writer = CheckpointWriter(tmp_path, "run", keep=1)
+def test_none_is_deleted_before_the_next_is_whole(make_state, method, tmp_path, monkeypatch):
+    writer = CheckpointWriter(tmp_path, "run", 1, method)
     writer.save(make_state(1), LOGS)
     writer.wait()
 

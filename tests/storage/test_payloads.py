@@ -85,9 +85,11 @@ def test_a_checkpoint_whose_digests_were_forged_as_well_executes_nothing(trace, 
 
 
 @pytest.fixture
-def checkpoint(make_state, tmp_path):
+def checkpoint(make_state, method, tmp_path):
     """The folder of generation 1."""
-    write_checkpoint(tmp_path, Checkpoint(1, "run", pack(make_state(1)), {"metrics.csv": "generation\r\n0\r\n"}))
+    write_checkpoint(
+        tmp_path, Checkpoint(1, "run", pack(make_state(1), method), {"metrics.csv": "generation\r\n0\r\n"})
+    )
     return checkpoint_path(tmp_path, 1)
 
 

@@ -46,7 +46,7 @@ def test_the_header_says_what_the_policy_is(saved, environment, small_config):
     assert (header["score"], header["std"]) == (policy.values.tolist(), policy.std.tolist())
     assert header["weights"] == policy.weights.tolist()
     assert header["network"]["sizes"] == [2, 64, 64, 2] and header["network"]["activation"] == "tanh"
-    assert header["run"] == {"id": "run-id", "config": small_config.digest(), "method": "interactive", "seed": 1}
+    assert header["run"] == {"id": "run-id", "config": small_config.identity(), "method": "interactive", "seed": 1}
     assert (header["id"], header["generation"], header["parent"]) == (17, 4, 13)
     assert header["format"] == FORMAT and header["jmorl"]
 

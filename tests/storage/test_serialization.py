@@ -6,6 +6,7 @@ import jax
 import numpy as np
 import pytest
 
+from jmorl.methods.pgmorl import PGMORLState
 from jmorl.search.archive import Archive
 from jmorl.state import RunState
 from jmorl.storage.serialization import PackingError, pack, unpack
@@ -36,26 +37,28 @@ def assert_same(one, other):
 
 
 @pytest.mark.parametrize("generation", [0, 3])
-def test_every_field_comes_back_bit_for_bit(make_state, small_config, environment, generation):
+def test_every_field_comes_back_bit_for_bit(make_state, small_config, environment, method, generation):
     state = make_state(generation)
-    assert_same(state, unpack(pack(state), small_config, environment))
+    assert_same(state, unpack(pack(state, method), small_config, environment))
 
 
-def test_a_state_in_raw_units_comes_back_too(make_state, small_config, environment):
+def test_a_state_in_raw_units_comes_back_too(make_state, small_config, environment, method):
     """The made-up states are in paper units, which have more to remember."""
     state = make_state(2)
 
     def raw(policies):
         return tuple(dataclasses.replace(policy, raw=None) for policy in policies)
 
+    buffer = state.search.buffer
+    in_raw_units = dataclasses.replace(buffer, members=raw(buffer.members))
     state = dataclasses.replace(
         state,
         units=None,
-        buffer=dataclasses.replace(state.buffer, members=raw(state.buffer.members)),
+        search=dataclasses.replace(state.search, buffer=in_raw_units),
         archive=Archive(raw(state.archive.members)),
         choice=raw([state.choice])[0],
     )
-    packed = pack(state)
+    packed = pack(state, method)
     assert_same(state, unpack(packed, small_config, environment))
     assert not {"raw", "units"} & set(packed.arrays)
 
@@ -68,32 +71,36 @@ def test_the_comparison_of_these_tests_sees_every_field(make_state):
         changed = dataclasses.replace(state, **{field.name: getattr(earlier, field.name)})
         with pytest.raises(AssertionError):
             assert_same(state, changed)
+    for field in dataclasses.fields(PGMORLState):
+        search = dataclasses.replace(state.search, **{field.name: getattr(earlier.search, field.name)})
+        with pytest.raises(AssertionError):
+            assert_same(state, dataclasses.replace(state, search=search))
     other = make_state(2)
     other.choice.snapshot.observation_statistics.mean.view(np.int32)[0] ^= 1
     with pytest.raises(AssertionError):
         assert_same(state, other)
 
 
-def test_a_policy_in_several_places_stays_one(make_state, small_config, environment):
-    state = unpack(pack(make_state(2)), small_config, environment)
-    assert state.choice in state.buffer.members
-    assert state.archive.members[0] in state.buffer.members
+def test_a_policy_in_several_places_stays_one(make_state, small_config, environment, method):
+    state = unpack(pack(make_state(2), method), small_config, environment)
+    assert state.choice in state.search.buffer.members
+    assert state.archive.members[0] in state.search.buffer.members
 
 
-def test_there_are_a_few_arrays_whatever_the_number_of_policies(make_state):
-    few, many = pack(make_state(1)), pack(make_state(6))
+def test_there_are_a_few_arrays_whatever_the_number_of_policies(make_state, method):
+    few, many = pack(make_state(1), method), pack(make_state(6), method)
     assert few.arrays.keys() == many.arrays.keys()
     assert len(many.arrays) < 16
 
 
-def test_another_network_is_refused_by_name(make_state, small_config, environment):
+def test_another_network_is_refused_by_name(make_state, small_config, environment, method):
     wider = small_config.replace(ppo={"hidden_sizes": (64, 32)})
-    with pytest.raises(PackingError, match=r"train_states of another shape: .*Dense_1.*\[64\].* where .*\[32\]"):
-        unpack(pack(make_state(1)), wider, environment)
+    with pytest.raises(PackingError, match=r"train states of another shape: .*Dense_1.*\[64\].* where .*\[32\]"):
+        unpack(pack(make_state(1), method), wider, environment)
 
 
-def test_a_restored_policy_has_memory_of_its_own(make_state, small_config, environment):
+def test_a_restored_policy_has_memory_of_its_own(make_state, small_config, environment, method):
     """Views would keep the numbers of all policies in memory as long as one is known."""
-    state = unpack(pack(make_state(1)), small_config, environment)
+    state = unpack(pack(make_state(1), method), small_config, environment)
     for leaf in jax.tree.leaves(state.archive.members[0].snapshot):
         assert leaf.base is None or leaf.base.size == leaf.size

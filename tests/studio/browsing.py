@@ -14,7 +14,7 @@ PATIENCE = 400_000  # milliseconds
 
 @contextmanager
 def chromium():
-    """Debian's browser, without a window."""
+    """Start Debian's browser, without a window."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -58,15 +58,15 @@ class Tab:
         return self.page.locator(".policies-row")
 
     def policies(self):
-        """The numbers of the policies in the table, from the top."""
+        """Return the numbers of the policies in the table, from the top."""
         return self.page.locator(".policies-row > span:nth-child(2)").all_inner_texts()
 
     def value(self, row):
-        """The first objective of a row."""
+        """Return the first objective of a row."""
         return float(self.rows().nth(row).locator("span").nth(2).inner_text().split()[0].replace("−", "-"))
 
     def look_at(self, row):
-        """Click a row of the table; the number of its policy, when its card is there."""
+        """Click a row of the table. Return the number of its policy when its card is there."""
         cell = self.rows().nth(row)
         policy = int(cell.locator("span").nth(1).inner_text())
         cell.click()
@@ -77,7 +77,7 @@ class Tab:
         return self.page.locator(".place", has=self.page.get_by_text(f"policy {policy}", exact=True))
 
     def choose(self, row=0):
-        """Choose the policy of a row; its number."""
+        """Choose the policy of a row. Return its number."""
         policy = self.look_at(row)
         self.card(policy).get_by_role("button", name="Choose").click()
         return policy
@@ -86,7 +86,7 @@ class Tab:
         self.page.get_by_role("tab", name=name).click()
 
     def bounds(self):
-        """Of the shaded region in the chart: its corner in the objectives' units, or None."""
+        """Return the lower corner of the shaded region in the chart, in the objectives' units, or None."""
         return self.page.evaluate(
             """() => {
               const area = chartOf(".front").getOption().series.find((each) => each.id === "bounds").markArea.data;
@@ -99,7 +99,7 @@ class Tab:
         )
 
     def pictures_differ(self, policy):
-        """Whether the canvas of a card moves."""
+        """Wait until the canvas of a card has moved."""
         canvas = self.card(policy).locator("canvas")
         first = canvas.evaluate("(canvas) => canvas.toDataURL()")
         self.page.wait_for_function(

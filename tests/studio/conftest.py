@@ -1,6 +1,7 @@
 """Sessions without a page: questions come out of a queue, so that nobody waits longer than they have to."""
 
 import queue
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -13,14 +14,15 @@ PATIENCE = 120  # seconds until a test fails that waits in vain
 
 
 class Watched(Session):
-    """A session that notes what is asked, and computes prospects at once."""
+    """A session that notes what is asked, and whose work in the background can be waited for."""
 
     def __init__(self):
-        super().__init__()
+        self.background = ThreadPoolExecutor(1)
+        super().__init__(background=self.background)
         self.asked = queue.Queue()
 
-    def _asked(self, question):
-        super()._asked(question)
+    def ask(self, question):
+        super().ask(question)
         self.asked.put(question)
 
     def question(self):
@@ -28,12 +30,11 @@ class Watched(Session):
 
     def ended(self):
         """Wait until the run has ended, or was left."""
-        self._thread.join(PATIENCE)
-        assert not self._thread.is_alive()
+        assert self.wait(PATIENCE)
 
     def thought(self):
         """Wait until all prospects are known."""
-        self._thinking.submit(lambda: None).result(PATIENCE)
+        self.background.submit(lambda: None).result(PATIENCE)
 
 
 @pytest.fixture(scope="session")
@@ -43,7 +44,7 @@ def person_config(small_config):
 
 @pytest.fixture
 def make_session():
-    """Sessions that are closed after the test, whatever came of them."""
+    """Make sessions that are closed after the test, whatever came of them."""
     made = []
 
     def make():
@@ -56,8 +57,8 @@ def make_session():
 
 
 @pytest.fixture
-def session(compiled_once, person_config, make_session, tmp_path):
-    """A new run with a person as its user, in its warm-up."""
+def session(person_config, make_session, tmp_path):
+    """Begin a run with a person as its user; it is in its warm-up."""
     session = make_session()
     folder = RunFolder.create(tmp_path / "run", person_config, envs.make(person_config.env))
     session.drive(Continued(folder, None))

@@ -72,6 +72,6 @@ class Served:
         raise AssertionError("the studio does not answer:\n" + "".join(self.log))
 
     def kill(self):
-        """As the operating system does when memory runs out."""
+        """Kill the server, as the operating system does when memory runs out."""
         self.process.kill()
         self.process.wait(60)

@@ -26,7 +26,7 @@ def browser():
 
 @pytest.fixture(scope="module")
 def small(small_config, tmp_path_factory):
-    """The settings of a run of seconds: three generations of an environment that any process knows by its module."""
+    """Return the settings of a short run: three generations of an environment that any process knows by its module."""
     config = tmp_path_factory.mktemp("config") / "config.toml"
     config.write_text(small_config.replace(env=f"tests.registered:{ThreeWays.id}").to_toml())
     return "--config", config
@@ -116,6 +116,8 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
             tab.page.get_by_role("button", name="Save the policy file").click()
         saved = tmp_path / "saved.npz"
         download.value.save_as(saved)
+        tab.page.get_by_role("button", name="How it came about").click()
+        tab.page.get_by_role("tab", name="History", selected=True).wait_for()
         assert not tab.problems
     policy = load_policy(saved)
     stored = read_run(branch)
@@ -241,5 +243,9 @@ def test_the_keyboard_is_enough(browser, small, tmp_path):
             if tab.page.evaluate("document.activeElement.textContent.trim()") == "Stop here":
                 break
         keys.press("Enter")
-        tab.page.get_by_role("button", name="End the run").press("Enter")
+        end = tab.page.get_by_role("button", name="End the run")
+        end.wait_for()
+        keys.press("k")  # goes to the dialog, for which it means nothing
+        end.press("Enter")
         tab.page.get_by_text("The result is policy").wait_for()
+        assert [each["stop"] for each in decisions(path)] == [False, False, True]

@@ -10,14 +10,14 @@ import pytest
 from envs.core import Objective
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
+from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
-from jmorl.state import Prospect
 from jmorl.studio import dialogue, texts
-from jmorl.studio.curves import curve_options
-from jmorl.studio.front_chart import front_marks, front_options
-from jmorl.studio.parallel_chart import parallel_marks, parallel_options
-from jmorl.studio.selection import Selection
+from jmorl.studio.charts.curves import curve_options
+from jmorl.studio.charts.front_chart import front_marks, front_options
+from jmorl.studio.charts.parallel_chart import parallel_marks, parallel_options
+from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import Generation, View
 
 VALUES = {4: (-80.0, -20.0), 9: (-70.0, -40.0), 2: (-60.0, -60.0), 5: (-90.0, -10.0)}
@@ -30,7 +30,7 @@ def policy(number, values):
 
 @pytest.fixture
 def view():
-    """Four policies, the bounds of a choice, and a question."""
+    """Return a view with four policies, the bounds of a choice, and a question."""
     front = tuple(policy(number, values) for number, values in VALUES.items())
     objectives = (Objective("time", "time", "-steps"), Objective("fuel", "<b>fuel</b>", "-J"))
     bounds = np.array([-82.0, -45.0])
@@ -201,13 +201,13 @@ def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
 @pytest.mark.parametrize(("objective", "than", "expected"), [(0, 4, [9, 2]), (1, 4, [5]), (0, None, [5, 4, 9, 2])])
 def test_more_of_an_objective_lists_the_least_change_first(view, objective, than, expected):
     selection = Selection(more_of=objective, than=than)
-    assert texts.wanted(view, selection) == expected
+    assert wanted(view, selection) == expected
     rings = series(front_marks(view, selection, (0, 1), None))["more of an objective"]["data"]
     assert {ring[0] for ring in rings} == set(expected)
 
 
 def test_with_nothing_wanted_there_is_no_ring(view):
-    assert texts.wanted(view, Selection()) is None
+    assert wanted(view, Selection()) is None
     assert not series(front_marks(view, Selection(), (0, 1), None))["more of an objective"]["data"]
 
 
@@ -220,6 +220,20 @@ def test_the_heading_says_what_is_asked(view):
     assert (
         texts.heading(ended, Selection()) == "The result is policy 2: time −60.0 ±0.5 -steps, <b>fuel</b> −60.0 ±2.0 -J"
     )
+
+
+@pytest.mark.parametrize(
+    ("silent", "user", "text"),
+    [
+        (1, "terminal", "You are asked when this generation is over."),
+        (3, "terminal", "You are asked again in 3 generations."),
+        (None, "terminal", "You are asked once, at the end."),
+        (1, "A", "User A decides; you watch."),
+    ],
+)
+def test_between_questions_the_heading_says_who_is_asked_and_when(view, silent, user, text):
+    config, timeline = resolve(overrides={"user": user}), replace(view.timeline, silent=silent)
+    assert texts.heading(replace(view, question=None, config=config, timeline=timeline), Selection()) == text
 
 
 @pytest.mark.parametrize(

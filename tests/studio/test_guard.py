@@ -25,7 +25,7 @@ def ask(headers=None, path="/", host="127.0.0.1", token=None):
 
 
 def connect(headers, token=None):
-    """What a web socket is answered: "inside", or the code it is closed with."""
+    """Return what a web socket is answered: "inside", or the code it is closed with."""
     answers = []
 
     async def inside(scope, receive, send):

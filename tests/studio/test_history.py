@@ -11,7 +11,7 @@ from jmorl.studio.history import free_folder, read_tree
 
 @pytest.fixture
 def runs(whole, tmp_path):
-    """A copy of the run, two branches, and a branch of one of them; and other folders."""
+    """Copy the run; make two branches, a branch of one of them, and other folders."""
     shutil.copytree(whole, tmp_path / "first")
     for parent, generation, name in (("first", 2, "b"), ("first", 1, "a"), ("a", 1, "aa")):
         branch(tmp_path / parent, generation, tmp_path / name).folder.close()

@@ -24,8 +24,8 @@ NAME = "<img src=x onerror=alert(1)>"
 
 
 @pytest.fixture(scope="module")
-def runs(compiled_once, small_config, tmp_path_factory):
-    """A finished run in a folder whose name is markup, with a secret beside it."""
+def runs(small_config, tmp_path_factory):
+    """Make a finished run in a folder whose name is markup, with a secret beside it."""
     place = tmp_path_factory.mktemp("studio")
     train(place / NAME, small_config.replace(env=f"tests.registered:{ThreeWays.id}"))
     (place / "secret.npz").write_text("secret")
@@ -40,7 +40,7 @@ def studio(runs):
 
 @pytest.fixture(scope="module")
 def guarded(runs):
-    """On all addresses of this machine, with a token."""
+    """Serve on all addresses of this machine, with a token."""
     shutil.copytree(runs / NAME, runs / "other")
     with Served(runs / "other", "--token", "sesame", host="0.0.0.0") as served:
         yield served
@@ -56,7 +56,7 @@ def run_of(runs):
 
 
 def is_open(served, origin, cookie=None):
-    """Whether the server opens its web socket to a page of this origin."""
+    """Return whether the server opens its web socket to a page of this origin."""
     url = f"ws://127.0.0.1:{served.port}{SOCKET}websocket"
     try:
         with connect(url, origin=origin, additional_headers={"Cookie": cookie} if cookie else None) as socket:

@@ -22,7 +22,7 @@ def best(question, objective):
 
 
 def answer_all(session, objective=0):
-    """Answer every question until the run ends; the answers."""
+    """Answer every question until the run ends. Return the answers."""
     answers = []
     while True:
         question = session.question()
@@ -195,7 +195,7 @@ def test_a_finished_run_whose_script_is_gone_is_shown_and_stepped_back_in(whole,
     assert session.question().generation == 2
 
 
-def test_a_run_with_an_artificial_user_is_watched(compiled_once, small_config, make_session, tmp_path):
+def test_a_run_with_an_artificial_user_is_watched(small_config, make_session, tmp_path):
     session = make_session()
     folder = RunFolder.create(tmp_path / "run", small_config, envs.make(small_config.env))
     session.drive(Continued(folder, None))
@@ -263,7 +263,7 @@ def test_the_last_answer_of_enautilus_can_be_taken_back_at_its_end(session):
     assert session.dialogue is None
 
 
-def test_what_breaks_a_run_off_is_said(compiled_once, person_config, make_session, tmp_path, monkeypatch):
+def test_what_breaks_a_run_off_is_said(person_config, make_session, tmp_path, monkeypatch):
     session = make_session()
     folder = RunFolder.create(tmp_path / "run", person_config, envs.make(person_config.env))
 

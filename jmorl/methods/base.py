@@ -1,0 +1,137 @@
+"""The protocol between a run and its search method.
+
+A method is a set of pure functions: all that it knows is in the problem it is made for and in the `RunState`, whose
+`search` field holds its own state. `jmorl.loop` orders the calls. A new method is a file with a subclass of `Method`,
+and one line that registers it (`jmorl.methods.registry`).
+
+Letters: P agents, M objectives, N policies, K predictions.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from envs.core import Objective
+from jmorl.decision.protocol import AnyQuestion
+from jmorl.search.metrics import Utility
+from jmorl.search.policy import Policy
+from jmorl.search.settings import SearchConfig
+from jmorl.state import RunState
+
+SearchState = TypeVar("SearchState")
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What a method is made for."""
+
+    objectives: tuple[Objective, ...]  # M, in the units of the scores
+    weights: np.ndarray  # [P, M] of the warm-up
+    seed: int
+    search: SearchConfig
+
+    @property
+    def agents(self) -> int:
+        """P."""
+        return len(self.weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Tasks:
+    """What a generation trains: a policy and its weights for each agent."""
+
+    parents: Sequence[Policy]  # [P] whose training is continued
+    weights: np.ndarray  # [P, M]
+    predicted: np.ndarray | None  # [P, M] expected values of the offspring; None for a method without a model
+    candidates: int  # policies that could have been continued
+
+
+@dataclass(frozen=True, eq=False)
+class Prospect:
+    """What choosing a policy would mean for the generation that follows."""
+
+    bounds: np.ndarray  # [M] that would be in force
+    kept: np.ndarray  # [N] bool, members of the archive that reach them; the others would be ruled out
+    expected: np.ndarray  # [K, M] best of what the prediction model expects within them; K may be zero
+
+
+@dataclass(frozen=True, eq=False)
+class PackedSearch:
+    """A method's state as a checkpoint keeps it."""
+
+    document: Mapping[str, Any] = field(default_factory=dict)  # what JSON can hold; policies by their ids
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict)  # none of them empty
+    policies: Sequence[Policy] = ()  # all that the document mentions
+
+
+class Method(ABC, Generic[SearchState]):
+    """A way to search: which policy is trained next with which weights, and what the decision maker is asked."""
+
+    def __init__(self, problem: Problem):
+        self.problem = problem
+
+    @abstractmethod
+    def initial_state(self) -> SearchState:
+        """Return what the method knows before the warm-up."""
+
+    @abstractmethod
+    def tasks(self, run: RunState) -> Tasks:
+        """Return what the next generation trains. `run.generation` is its number, from 1."""
+
+    @abstractmethod
+    def taken_in(self, run: RunState, offspring: Sequence[Policy], tasks: Tasks | None) -> SearchState:
+        """Return the method's state with a generation's offspring [P], which `run.archive` has been offered.
+
+        `tasks` is None in the warm-up; in paper units that comes twice, with the untrained agents first.
+        """
+
+    @abstractmethod
+    def pack(self, state: SearchState) -> PackedSearch:
+        """Return the state as a checkpoint keeps it."""
+
+    @abstractmethod
+    def unpack(
+        self, document: Mapping[str, Any], arrays: Mapping[str, np.ndarray], policies: Mapping[int, Policy]
+    ) -> SearchState:
+        """Return the state that was packed, bit for bit."""
+
+    def question(self, run: RunState) -> AnyQuestion | None:
+        """Return what to ask before the next generation; None to go on. It is called again after every answer."""
+        return None
+
+    def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> SearchState:
+        """Return the method's state after an answer to its question; `run.choice` is what was chosen, if a policy."""
+        state: SearchState = run.search
+        return state
+
+    def asking_at_once(self, state: SearchState) -> SearchState:
+        """Return the state in which the next question, if there are any, comes before the next generation."""
+        return state
+
+    def final_front(self, run: RunState) -> Sequence[Policy]:
+        """Return the policies, at least one, among which the run's result is chosen."""
+        return run.archive.members
+
+    def bounds(self, state: SearchState) -> np.ndarray:
+        """Return the lower bounds [M] of the part of objective space in which is searched; -inf without a bound."""
+        return np.full(len(self.problem.objectives), -np.inf)
+
+    def generations_to_question(self, state: SearchState) -> int | None:
+        """Return how many generations end before the next question; None for a method that never asks."""
+        return None
+
+    def prospect(self, run: RunState, policy: Policy) -> Prospect | None:
+        """Return what choosing a policy would mean; None if a choice changes nothing."""
+        return None
+
+    def metrics(
+        self, run: RunState, utility: Utility, offspring: Sequence[Policy], tasks: Tasks | None
+    ) -> Mapping[str, float | None]:
+        """Return the method's own columns of a generation's metrics, the same names every time; None where unknown.
+
+        `utility` is the decision maker's; it returns None for one that has none.
+        """
+        return {}

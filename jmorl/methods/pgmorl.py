@@ -1,0 +1,144 @@
+"""PGMORL (Xu et al. 2020): a model predicts what comes of each policy and weights; the most promising are trained.
+
+Nobody is asked before the end. Letters: C candidates, W candidate weights, P agents, M objectives.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from jmorl.methods.base import Method, PackedSearch, Tasks
+from jmorl.search.bounds import members_within
+from jmorl.search.buffer import PerformanceBuffer
+from jmorl.search.metrics import Utility, prediction_metrics, utility_metrics
+from jmorl.search.policy import Policy, values_of
+from jmorl.search.prediction import Records, predict
+from jmorl.search.scaling import REFERENCE_MARGIN, Scale, range_scale, search_scale
+from jmorl.search.selection import select_tasks
+from jmorl.search.weights import simplex_grid
+from jmorl.state import RunState, reference_point
+
+
+@dataclass(frozen=True)
+class PGMORLState:
+    """What the search knows besides the archive."""
+
+    buffer: PerformanceBuffer
+    records: Records
+    bounds: np.ndarray  # [M] -inf where there is none; only the interactive method sets them
+    silent_generations: int = 0  # of the interactive method: generations to go before the next question
+
+
+class PGMORL(Method[PGMORLState]):
+    """PGMORL, and what the interactive method takes over from it."""
+
+    def initial_state(self) -> PGMORLState:
+        """Return an empty buffer and no records."""
+        return self._state((), Records.empty(len(self.problem.objectives)))
+
+    def tasks(self, run: RunState) -> Tasks:
+        """Return the tasks whose predicted offspring improve the front most.
+
+        After a choice only what lies within the bounds counts as an improvement.
+        """
+        search, state = self.problem.search, run.search
+        continued = self.candidates(run)
+        scale = self._scale_of_gains(run)
+        bounded = run.choice is not None and search.gain_within == "bounds"
+        front = members_within(run.archive.members, state.bounds) if bounded else run.archive.members
+        if bounded:
+            reference = scale.apply(state.bounds)
+        elif search.value_scale == "range":
+            reference = np.full_like(state.bounds, -REFERENCE_MARGIN)
+        else:
+            reference = np.zeros_like(state.bounds)  # the scale's origin is the reference point
+        tasks = select_tasks(
+            scale.apply(self.predictions(run, continued)),
+            scale.apply(values_of(front)),
+            reference,
+            self.problem.agents,
+            search.sparsity_weight,
+            np.random.default_rng([self.problem.seed, run.generation]),
+        )
+        return Tasks(
+            [continued[task.candidate] for task in tasks],
+            self.candidate_weights()[[task.weight for task in tasks]],
+            scale.invert(np.stack([task.predicted for task in tasks])),
+            len(continued),
+        )
+
+    def candidates(self, run: RunState) -> list[Policy]:
+        """Return the policies whose training may be continued, at least one."""
+        return list(run.search.buffer.members)
+
+    def predictions(self, run: RunState, policies: Sequence[Policy]) -> np.ndarray:
+        """Return what policies are expected to become with each of the candidate weights, [C, W, M].
+
+        The model's constants are for values scaled by range, whatever scale the gains are measured in.
+        """
+        state = run.search
+        scale = search_scale(run.archive.values, state.bounds, reference_point(run), "range")
+        return scale.invert(
+            predict(scale.apply(values_of(policies)), self.candidate_weights(), state.records.scaled(scale))
+        )
+
+    def candidate_weights(self) -> np.ndarray:
+        """Return the weights [W, M] that a policy may be trained with after the warm-up."""
+        return simplex_grid(len(self.problem.objectives), self.problem.search.weight_divisions)
+
+    def taken_in(self, run: RunState, offspring: Sequence[Policy], tasks: Tasks | None) -> PGMORLState:
+        """Return the state with the offspring in buffer and records."""
+        state: PGMORLState = run.search
+        records = state.records
+        if tasks:
+            records = records.add(values_of(tasks.parents), tasks.weights, values_of(offspring))
+        return replace(state, records=records, buffer=state.buffer.offer(offspring, self._scale_of_gains(run)))
+
+    def bounds(self, state: PGMORLState) -> np.ndarray:
+        """Return the bounds [M] in force."""
+        return state.bounds
+
+    def metrics(
+        self, run: RunState, utility: Utility, offspring: Sequence[Policy], tasks: Tasks | None
+    ) -> Mapping[str, float | None]:
+        """Return how good the prediction model was, and the utility of the population.
+
+        The population of the paper's equations 6 and 7 is the performance buffer, for every method.
+        """
+        state = run.search
+        scale = range_scale(run.archive.values)
+        return {
+            **utility_metrics(utility, state.buffer.members, state.bounds),
+            **prediction_metrics(tasks.parents if tasks else (), offspring, scale),
+        }
+
+    def pack(self, state: PGMORLState) -> PackedSearch:
+        """Return the state as a checkpoint keeps it. Records are left out before there are any."""
+        records = {f"records_{name}": array for name, array in vars(state.records).items() if len(array)}
+        document = {
+            "buffer": [policy.id for policy in state.buffer.members],
+            "silent_generations": state.silent_generations,
+        }
+        return PackedSearch(document, {"bounds": state.bounds, **records}, state.buffer.members)
+
+    def unpack(
+        self, document: Mapping[str, Any], arrays: Mapping[str, np.ndarray], policies: Mapping[int, Policy]
+    ) -> PGMORLState:
+        """Return the state that was packed."""
+        names = [f"records_{each.name}" for each in fields(Records)]
+        packed = names[0] in arrays
+        records = Records(*(arrays[each] for each in names)) if packed else Records.empty(len(arrays["bounds"]))
+        state = self._state(tuple(policies[each] for each in document["buffer"]), records)
+        return replace(state, bounds=arrays["bounds"], silent_generations=document["silent_generations"])
+
+    def _state(self, members: tuple[Policy, ...], records: Records) -> PGMORLState:
+        search = self.problem.search
+        buffer = PerformanceBuffer(search.buffer_bins, search.buffer_size, members)
+        return PGMORLState(buffer, records, bounds=np.full(len(self.problem.objectives), -np.inf))
+
+    def _scale_of_gains(self, run: RunState) -> Scale:
+        """Return the scale in which improvements of the front are measured."""
+        kind = self.problem.search.value_scale
+        return search_scale(run.archive.values, run.search.bounds, reference_point(run), kind)

@@ -1,0 +1,26 @@
+"""The settings of the search."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from jmorl.settings import Count, NonNegative, Section
+
+
+class SearchConfig(Section):
+    """Which policy is trained next, and with which weights."""
+
+    delta: NonNegative = Field(0.1, description="slack of the bounds, z - delta sqrt(s |z|)")
+    bounds_scale: Literal["range", "one"] = Field(
+        "range", description="s in the bounds: the archive's range of each objective, or 1 (the paper)"
+    )
+    gain_within: Literal["bounds", "front"] = Field(
+        "bounds", description="interactive: measure gains inside the bounds, or over the whole front (the paper)"
+    )
+    value_scale: Literal["range", "none"] = Field(
+        "range", description="search in values scaled by the archive's range, or in values less the reference point"
+    )
+    sparsity_weight: NonNegative = Field(1.0, description="alpha, cost of a sparse front against its hypervolume")
+    weight_divisions: Count = Field(10, description="steps on each edge of the grid of candidate weights")
+    buffer_bins: Count = Field(100, description="directions of the performance buffer")
+    buffer_size: Count = Field(4, description="policies kept in each direction")

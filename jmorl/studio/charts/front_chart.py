@@ -1,0 +1,248 @@
+"""The front as points in two of its objectives, with its bounds, earlier fronts, choices and expectations."""
+
+from typing import Any
+
+import numpy as np
+
+from envs.core import Objective
+from jmorl.decision.protocol import PointQuestion
+from jmorl.display.limits import around, core, inside
+from jmorl.display.text import plural
+from jmorl.methods.base import Prospect
+from jmorl.search.bounds import within
+from jmorl.studio.charts.chart_style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    LETTER_COLOURS,
+    ORANGE,
+    PALE,
+    TEXT,
+    TOOLTIP_TEXT,
+    base,
+    better,
+    plain,
+)
+from jmorl.studio.selection import Selection, wanted
+from jmorl.studio.view import View
+
+STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 12.4 L0 7.6 L7.1 6.9 Z"
+GHOSTS = 6  # earlier fronts
+IN_FORCE = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
+PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
+MANY = 300  # policies; more are drawn smaller
+
+
+def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
+    """Draw what stays while policies are looked at; `axes` are the objectives to the right and upwards."""
+    limits = _limits(view, asked)
+    far_out = int((~inside(view.values, limits)).sum()) if view.front else 0
+    note = f"{plural(far_out, 'policy')} far out, in the table only" if far_out else ""
+    return {
+        **_frame(view, axes, limits, visible=True),
+        "title": {"text": note, "right": 18, "top": 0, "textStyle": {**TEXT, "color": GREY, "fontWeight": "normal"}},
+        "series": [
+            _area("bounds", view.bounds, axes, limits, IN_FORCE),
+            _ghosts(view, axes),
+            _members(view, axes, within_bounds=False),
+            _members(view, axes, within_bounds=True),
+            _journey(view, axes),
+            _result(view, axes),
+        ],
+    }
+
+
+def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
+    """Draw what follows from the selection: a chart to put over the other, so that little is drawn anew."""
+    limits = _limits(view, asked)
+    prospect = selection.prospect if view.question else None  # what is answered brings nothing any more
+    bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
+    return {
+        **_frame(view, axes, limits, visible=False),
+        "series": [
+            _area("bounds that would follow", bounds, axes, limits, PROPOSED),
+            _expected(prospect, axes),
+            _wanted(view, selection, axes),
+            _laid_out(view, selection, axes),
+            _points(asked, axes),
+        ],
+    }
+
+
+def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
+    """Return the options that give both charts the same axes."""
+    visible = visible and bool(view.front)
+    x, y = (
+        _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
+    )
+    grid = {"left": 62, "right": 18, "top": 14, "bottom": 44}
+    return {**base(), "grid": grid, "xAxis": x, "yAxis": y}
+
+
+def _limits(view: View, asked: PointQuestion | None) -> np.ndarray:
+    """Return the limits [2, M] of the axes: around the front (but for what is far out), bounds, choices and points."""
+    if not view.front:
+        return np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
+    seen = np.vstack([view.values, *(values for _, values in view.choices)])
+    shown = [
+        seen[core(seen)],
+        *(choice.values[None] for choice in (view.previous, view.result) if choice),
+    ]
+    if np.isfinite(view.bounds).all():
+        shown.append(view.bounds[None])
+    if asked:
+        shown.append(np.stack([asked.state.point, *(point.value for point in asked.points)]))
+    return around(np.concatenate(shown))
+
+
+def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> dict[str, Any]:
+    low, high = limits.tolist()
+    return {
+        "type": "value",
+        "show": visible,
+        "name": better(objective),
+        "nameLocation": "middle",
+        "nameGap": gap,
+        "nameTextStyle": TEXT,
+        "min": low,
+        "max": high,
+        "axisLabel": {**TEXT, "showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
+        "axisLine": {"onZero": False, "lineStyle": {"color": GREY}},
+        "splitLine": {"lineStyle": {"color": "#ececec"}},
+        "splitNumber": 5,
+    }
+
+
+def _scatter(name: str, data: list[Any], axes: tuple[int, int], **style: Any) -> dict[str, Any]:
+    """Return a series of points [policy, values..., note]; only those that are not silent answer the mouse."""
+    return {
+        "type": "scatter",
+        "id": name,
+        "name": name,
+        "data": data,
+        "encode": {"x": axes[0] + 1, "y": axes[1] + 1},
+        **style,
+    }
+
+
+def _members(view: View, axes: tuple[int, int], within_bounds: bool) -> dict[str, Any]:
+    """Draw the members of the front within the bounds, or those outside them; pale if they cannot be chosen."""
+    kept = within(view.values, view.bounds) == within_bounds
+    data = [
+        [policy.id, *values, "" if within_bounds else "outside the bounds"]
+        for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
+        if shown
+    ]
+    open_to_choice = within_bounds or view.question is None or view.question.purpose == "steer"
+    style = {"color": BLUE} if within_bounds else {"color": "#ffffff", "borderWidth": 1.5}
+    border = {"borderColor": "#ffffff"} if within_bounds else {"borderColor": BLUE if open_to_choice else PALE}
+    names = ["policy", *(f"{each.label} ({each.unit})" for each in view.objectives), "note"]
+    return _scatter(
+        "within the bounds" if within_bounds else "outside the bounds",
+        data,
+        axes,
+        dimensions=names,
+        tooltip={":formatter": TOOLTIP_TEXT},
+        symbolSize=(9 if within_bounds else 7) if len(view.front) <= MANY else 5,
+        itemStyle={**style, **border},
+        emphasis={"scale": 1.6},
+        z=4 if within_bounds else 3,
+    )
+
+
+def _ghosts(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    earlier = view.generations[:-1][-GHOSTS:]
+    data = [[0, *values, ""] for generation in earlier for values in plain(generation.front)]
+    return _scatter("earlier fronts", data, axes, silent=True, symbolSize=4, itemStyle={"color": PALE}, z=1)
+
+
+def _journey(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    """Draw the choices so far, each with the generation it was made for."""
+    data = [
+        {"value": [0, *plain(values)[0], ""], "label": {"formatter": _when(view, generation)}}
+        for generation, values in view.choices
+    ]
+    return {
+        **_scatter("choices", data, axes, silent=True, symbolSize=15, z=5),
+        "type": "line",
+        "symbol": "circle",
+        "showAllSymbol": True,
+        "itemStyle": {"color": "transparent", "borderColor": INK, "borderWidth": 1.5},
+        "lineStyle": {"color": INK, "width": 1, "type": "dotted"},
+        "label": {"show": True, "position": "left", "distance": 12, "fontSize": 10, "color": INK},
+        "labelLayout": {"hideOverlap": True},
+    }
+
+
+def _when(view: View, generation: int) -> str:
+    """Say when a choice was made: before which generation, or after the last one."""
+    return "end" if view.result and view.generations and generation > view.generations[-1].number else str(generation)
+
+
+def _result(view: View, axes: tuple[int, int]) -> dict[str, Any]:
+    data = [[view.result.id, *plain(view.result.values)[0], "the result"]] if view.result else []
+    style = {"symbol": STAR, "symbolSize": 32, "itemStyle": {"color": ORANGE, "borderColor": INK, "borderWidth": 1}}
+    return _scatter("result", data, axes, silent=True, z=6, **style)
+
+
+def _area(
+    name: str, bounds: np.ndarray, axes: tuple[int, int], limits: np.ndarray, style: dict[str, Any]
+) -> dict[str, Any]:
+    """Draw the area at least as good as the bounds, as far as the chart reaches; nothing without bounds."""
+    corners: list[dict[str, Any]] = []
+    low, high = limits[:, list(axes)].tolist()
+    if np.isfinite(bounds[list(axes)]).any():
+        x, y = np.clip(bounds[list(axes)], low, high).tolist()
+        corners = [{"coord": [x, y]}, {"coord": high}]
+    area = {"silent": True, "itemStyle": style, "data": [corners] if corners else []}
+    return {"type": "scatter", "id": name, "name": name, "data": [], "silent": True, "markArea": area}
+
+
+def _expected(prospect: Prospect | None, axes: tuple[int, int]) -> dict[str, Any]:
+    expected = prospect.expected if prospect else np.zeros((0, 0))
+    data = [[0, *values, ""] for values in plain(expected)] if len(expected) else []
+    style = {"symbol": "path://M4 0h2v4h4v2h-4v4h-2v-4h-4v-2h4z", "symbolSize": 8, "itemStyle": {"color": GREEN}}
+    return _scatter("expected by the model", data, axes, silent=True, z=2, **style)
+
+
+def _wanted(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
+    """Draw rings around the policies that are better in the objective asked for."""
+    more = set(wanted(view, selection) or ())
+    data = [[policy.id, *plain(policy.values)[0], ""] for policy in view.front if policy.id in more]
+    style = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
+    return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=style, z=6)
+
+
+def _laid_out(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
+    data = []
+    for policy_id, letter in selection.letters.items():
+        policy = view.policy(policy_id)
+        if policy:
+            focused = policy_id == selection.focus
+            data.append(
+                {
+                    "value": [policy_id, *plain(policy.values)[0], ""],
+                    "label": {"formatter": letter},
+                    "symbolSize": 22 if focused else 17,
+                    "itemStyle": {"color": LETTER_COLOURS[letter], "borderColor": INK if focused else "#ffffff"},
+                }
+            )
+    label = {"show": True, "position": "inside", "color": "#ffffff", "fontWeight": "bold", "fontSize": 11}
+    return _scatter("laid out", data, axes, silent=True, label=label, z=7, itemStyle={"borderWidth": 1.5})
+
+
+def _points(asked: PointQuestion | None, axes: tuple[int, int]) -> dict[str, Any]:
+    """Draw the points of E-NAUTILUS, and the point where the person stands."""
+    data: list[dict[str, Any]] = []
+    if asked:
+        label = {"formatter": "you", "position": "right"}
+        here = {"value": [0, *plain(asked.state.point)[0], ""], "symbol": "triangle", "label": label}
+        points = [
+            {"value": [0, *plain(point.value)[0], ""], "label": {"formatter": str(number)}}
+            for number, point in enumerate(asked.points, start=1)
+        ]
+        data = [here, *points]
+    text = {"show": True, "position": "inside", "fontSize": 10, "fontWeight": "bold", "color": INK}
+    style = {"symbol": "diamond", "symbolSize": 24, "itemStyle": {"color": ORANGE, "borderColor": INK}}
+    return _scatter("points of E-NAUTILUS", data, axes, silent=True, label=text, z=8, **style)

@@ -1,0 +1,98 @@
+"""The front as lines across an axis for each objective, a line for each policy."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from jmorl.display.limits import around
+from jmorl.display.text import objective_label
+from jmorl.search.bounds import within
+from jmorl.studio.charts.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
+from jmorl.studio.selection import Selection
+from jmorl.studio.view import View
+
+
+def parallel_options(view: View) -> dict[str, Any]:
+    """Draw what stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
+    inside = within(view.values, view.bounds)
+    return {
+        **_frame(view, visible=True),
+        "series": [
+            _lines("outside the bounds", view, ~inside, PALE),
+            _lines("within the bounds", view, inside, BLUE),
+            _bounds(view),
+        ],
+    }
+
+
+def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
+    """Draw the lines of the policies laid out: a chart to put over the other."""
+    lines = [
+        {
+            "value": [*plain(policy.values)[0], policy.id],
+            "lineStyle": {
+                "color": LETTER_COLOURS[letter],
+                "width": 4 if policy.id == selection.focus else 2.5,
+                "opacity": 1,
+            },
+        }
+        for policy_id, letter in selection.letters.items()
+        if (policy := view.policy(policy_id))
+    ]
+    series = {"type": "parallel", "id": "laid out", "name": "laid out", "data": lines, "silent": True}
+    return {**_frame(view, visible=False), "series": [series]}
+
+
+def _frame(view: View, visible: bool) -> dict[str, Any]:
+    """Return the options that give both charts the same axes."""
+    shown = np.concatenate([view.values, view.bounds[None]]) if _bounded(view) else view.values
+    limits = around(shown) if len(shown) else np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
+    visible = visible and bool(view.front)
+    text = {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False}
+    axes = [
+        {
+            "dim": index,
+            "name": f"↑ {objective_label(objective)}" if visible else "",
+            "nameTextStyle": TEXT,
+            "nameGap": 12,
+            "min": float(low),
+            "max": float(high),
+            # The first axis has its numbers on its left, where no lines are.
+            "axisLabel": {**text, "margin": -8, "align": "right"} if index == 0 else {**text, "margin": 8},
+            "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
+            "axisTick": {"show": visible, "length": -5 if index == 0 else 5},
+        }
+        for index, (objective, low, high) in enumerate(zip(view.objectives, *limits, strict=True))
+    ]
+    return {**base(), "parallel": {"left": 70, "right": 90, "top": 34, "bottom": 14}, "parallelAxis": axes}
+
+
+def _bounded(view: View) -> bool:
+    return bool(view.front) and bool(np.isfinite(view.bounds).all())
+
+
+def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, Any]:
+    data = [
+        [*values, policy.id]
+        for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
+        if shown
+    ]
+    opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
+    style = {"color": colour, "width": 1.2, "opacity": opacity}
+    tooltip = {":formatter": LINE_TOOLTIP % json.dumps([objective_label(each) for each in view.objectives])}
+    return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": style, "tooltip": tooltip, "z": 2}
+
+
+def _bounds(view: View) -> dict[str, Any]:
+    data = [plain(view.bounds)[0]] if _bounded(view) else []
+    style = {"color": INK, "width": 1.5, "type": "dashed", "opacity": 1}
+    return {
+        "type": "parallel",
+        "id": "bounds",
+        "name": "bounds",
+        "data": data,
+        "lineStyle": style,
+        "silent": True,
+        "z": 4,
+    }

@@ -1,0 +1,99 @@
+"""The policies that are laid out: their behaviour, their scores, and what choosing them would mean."""
+
+from nicegui import ui
+from nicegui.element import Element
+
+from jmorl.search.policy import Policy
+from jmorl.studio import texts
+from jmorl.studio.charts.chart_style import decimals
+from jmorl.studio.panels.panel import Shown
+from jmorl.studio.selection import LETTERS
+from jmorl.studio.tab import Tab
+
+
+class Player(Element, component="player.js"):
+    """A canvas that plays an episode, or the controls of all of them."""
+
+
+class Cards:
+    """The places of the cards, one for each letter; a policy stays in its place while it is laid out."""
+
+    def __init__(self, tab: Tab):
+        self.tab = tab
+        self.shown = Shown()
+        self.cards: dict[str, Card] = {}
+        with ui.element("section").classes("panel behaviour").props('aria-label="Behaviour"'):
+            controls = Player()
+            controls.props["controls"] = True
+            self.hint = ui.label("Click a policy in a chart or in the table to see what it does.").classes("hint")
+            with ui.element("div").classes("cards"):
+                self.places = {letter: ui.element("article").classes("place") for letter in LETTERS}
+
+    def show(self) -> None:
+        """Show the policies that are laid out. A card that is shown stays: it plays an episode."""
+        view, selection = self.tab.view, self.tab.selection
+        if not self.shown.is_new(view, selection):
+            return
+        for letter, place in self.places.items():
+            policy = view.policy(selection.places[letter]) if letter in selection.places else None
+            card = self.cards.get(letter)
+            if card and (policy is None or (view.run, policy.id) != (card.run, card.policy.id)):
+                place.clear()
+                del self.cards[letter]
+            if policy and letter not in self.cards:
+                with place:
+                    self.cards[letter] = Card(self.tab, policy, letter)
+            if policy:
+                self.cards[letter].show()
+            focused = policy is not None and policy.id == selection.focus
+            place.classes(add="focus" if focused else None, remove=None if focused else "focus")
+            place.set_visibility(policy is not None)
+        self.hint.set_visibility(not self.cards)
+
+
+class Card:
+    """The card of one policy."""
+
+    def __init__(self, tab: Tab, policy: Policy, letter: str):
+        self.tab = tab
+        self.policy = policy
+        self.letter = letter
+        view = tab.view
+        self.run = view.run
+        with ui.element("div").classes("card-head"):
+            ui.label(letter).classes(f"letter mark-{letter}")
+            ui.label(f"policy {policy.id}").classes("card-title")
+            address = f"/policies/{view.run}/{policy.id}.npz"
+            ui.button(icon="download", on_click=lambda: ui.download(address)).props(
+                f'flat dense round size=xs aria-label="save the file of policy {policy.id}"'
+            )
+            ui.button(icon="close", on_click=lambda: tab.put_away(policy.id)).props(
+                f'flat dense round size=xs aria-label="put policy {policy.id} away"'
+            )
+        player = Player()
+        digits = decimals(view.values) if view.front else [2] * len(view.objectives)
+        player.props["src"] = f"/episodes/{view.run}/{policy.id}"
+        player.props["objectives"] = [f"{each.label} so far" for each in view.objectives]
+        player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]
+        player.props["label"] = f"policy {policy.id} at work"
+        with ui.element("dl").classes("scores"):
+            for score, objective in zip(texts.score_of_each(view, policy), view.objectives, strict=True):
+                with ui.element("dt"):
+                    ui.label(objective.label)
+                with ui.element("dd"):
+                    ui.label(score)
+        if policy.raw is not None:
+            ui.label(texts.raw_returns(view, policy)).classes("consequences")
+        self.consequences = ui.label().classes("consequences")
+        self.choose = ui.button(on_click=lambda: tab.choose(policy.id)).props("no-caps dense").classes("choose")
+
+    def show(self) -> None:
+        """Show what depends on the question and on the focus."""
+        view, selection = self.tab.view, self.tab.selection
+        focused = selection.focus == self.policy.id
+        prospect = selection.prospects.get(self.policy.id) if view.question else None
+        self.consequences.set_text(texts.consequences(view, prospect, self.policy))
+        self.choose.set_visibility(view.choosable(self.policy.id))
+        final = view.question is not None and view.question.purpose == "final"
+        self.choose.set_text(f"{self.letter} is the result" if final else f"Choose {self.letter}")
+        self.choose.props(remove="outline" if focused else "", add="" if focused else "outline")

@@ -1,0 +1,36 @@
+"""The line at the top: the run, its phase, and the share of its budget that is used."""
+
+from nicegui import ui
+
+from jmorl.studio import texts
+from jmorl.studio.panels.panel import Shown
+from jmorl.studio.tab import Tab
+
+TICK_SECONDS = 1.0  # between two times that are shown
+
+
+class Header:
+    """The name of the run, its phase, its budget and its speed."""
+
+    def __init__(self, tab: Tab):
+        self.tab = tab
+        self.shown = Shown()
+        self.next_tick = 0.0  # on the session's clock
+        ui.label("jmorl studio").classes("brand")
+        self.run_name = ui.label().classes("run-name")
+        self.phase = ui.label().classes("phase").props('role="status"')
+        with ui.element("div").classes("meter").props('role="progressbar" aria-label="Budget used"'):
+            self.meter = ui.element("div")
+        self.facts = ui.label().classes("facts")
+
+    def show(self) -> None:
+        """Show a new view at once, and otherwise, once a second, what changes with time alone."""
+        view, session = self.tab.view, self.tab.session
+        now = session.clock()
+        if not self.shown.is_new(view) and now < self.next_tick:
+            return
+        self.next_tick = now + TICK_SECONDS
+        self.run_name.set_text(f"{view.path.name} · {view.config.env}")
+        self.phase.set_text(texts.phase(view, now, session.leaving))
+        self.facts.set_text(texts.facts(view, now))
+        self.meter.style(f"width: {100 * texts.share_done(view, now):.1f}%")

@@ -1,0 +1,48 @@
+"""The keyboard: the command of each key, and the list of the keys."""
+
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+from jmorl.display.text import objective_label
+from jmorl.studio import texts
+from jmorl.studio.tab import Tab
+
+
+class Keys:
+    """The keys of a tab, and the button that lists them."""
+
+    def __init__(self, tab: Tab):
+        self.tab = tab
+        ui.keyboard(self._press, ignore=["input", "select", "textarea"], repeating=True)
+        with ui.dialog().bind_value_to(tab, "covered") as self.list, ui.card():
+            ui.label("Keys").classes("title")
+            with ui.element("dl").classes("keys"):
+                for key, what in texts.KEYS:
+                    with ui.element("dt"):
+                        ui.label(key)
+                    with ui.element("dd"):
+                        ui.label(what)
+            for number, objective in enumerate(tab.view.objectives, start=1):
+                ui.label(f"{number}: {objective_label(objective)}")
+            ui.button("Close", on_click=self.list.close).props("flat no-caps")
+        ui.button("Keys", on_click=self.list.open).props("flat dense no-caps size=sm")
+
+    def _press(self, event: KeyEventArguments) -> None:
+        modified = event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta
+        if not event.action.keydown or modified or self.tab.covered:
+            return
+        key, focus = event.key, self.tab.selection.focus
+        if key.arrow_left or key.arrow_right:
+            self.tab.look_along(1 if key.arrow_right else -1)
+        elif event.action.repeat:  # a key that is held down answers once
+            return
+        elif key.number and key.number <= len(self.tab.view.objectives):
+            self.tab.more_of(key.number - 1)
+        elif key == "?":
+            self.list.open()
+        elif key == "c" and focus is not None:
+            self.tab.choose(focus)
+        elif key == "x" and focus is not None:
+            self.tab.put_away(focus)
+        elif key == "k":
+            self.tab.keep()

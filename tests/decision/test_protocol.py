@@ -1,0 +1,109 @@
+"""Answers are checked and converted where they are given, with one sentence for what is none."""
+
+import json
+
+import numpy as np
+import pytest
+
+from envs import Objective
+from jmorl.decision.protocol import Answer, AnswerError, Back, Choose, PairQuestion, Question, WeightQuestion
+from jmorl.decision.records import from_json, read_log, record_of, to_json
+from jmorl.search.policy import Policy
+
+OBJECTIVES = (Objective("time", "time", "s"), Objective("fuel", "fuel", "l"))
+
+
+def policy(number, *values):
+    nothing = np.zeros(2)
+    return Policy(number, 0, None, nothing, np.array(values, float), nothing, nothing, None)
+
+
+FRONT = (policy(3, -1, -5), policy(7, -2, -4))
+QUESTION = Question("steer", 1, OBJECTIVES, FRONT, np.full(2, -np.inf), None)
+PAIR = PairQuestion(2, OBJECTIVES, FRONT)
+WEIGHTS = WeightQuestion(1, OBJECTIVES, FRONT)
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        (lambda: Answer(FRONT[1]), Answer(7)),
+        (lambda: Answer(np.int64(7)), Answer(7)),
+        (lambda: Answer(7.0, generations=2.0), Answer(7, generations=2)),
+        (lambda: Answer(7, generations=np.int64(1)), Answer(7)),
+        (lambda: Answer(7, stop=np.bool_(True)), Answer(7, stop=True)),
+    ],
+)
+def test_what_means_an_answer_becomes_one_in_its_proper_types(given, kept):
+    answer = QUESTION.checked(given())
+    assert answer == kept
+    assert [type(each) for each in (answer.policy, answer.stop, answer.generations)] == [int, bool, int]
+    json.dumps(QUESTION.to_json(answer))
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (lambda: Answer(7, generations=0), "generations must be a whole number, at least 1, not 0"),
+        (lambda: Answer(7, generations=-1), "generations must be a whole number, at least 1, not -1"),
+        (lambda: Answer(7, generations=1.5), "generations must be a whole number, not 1.5"),
+        (lambda: Answer(7, generations=True), "generations must be a whole number, at least 1, not True"),
+        (lambda: Answer(7, stop="yes"), "stop must be True or False, not 'yes'"),
+        (lambda: Answer(None), "policy must be a whole number, not None"),
+        (lambda: Answer("7"), "policy must be a whole number, not '7'"),
+        (lambda: Answer(float("nan")), "policy must be a whole number, not nan"),
+        (lambda: None, r"answer must return a jmorl.Answer\(policy id\), not None"),
+        (lambda: FRONT[0], r"answer must return a jmorl.Answer\(policy id\), not Policy"),
+        (lambda: 7, r"answer must return a jmorl.Answer\(policy id\), not 7"),
+        (lambda: Answer(4), r"policy 4 is not among the policies shown: \[3, 7\]"),
+        (lambda: Answer(policy(4, 0, 0)), r"policy 4 is not among the policies shown"),
+    ],
+)
+def test_what_is_no_answer_is_refused_in_one_sentence(given, sentence):
+    with pytest.raises(AnswerError, match=sentence):
+        QUESTION.checked(given())
+
+
+@pytest.mark.parametrize(("given", "kept"), [(3, 3), (np.int64(7), 7), (FRONT[1], 7), (None, None)])
+def test_a_pair_has_a_better_one_or_none(given, kept):
+    assert PAIR.checked(given) == kept
+
+
+@pytest.mark.parametrize(("given", "sentence"), [(5, "policy 5 is neither of the two"), ("left", "not 'left'")])
+def test_what_is_none_of_the_pair_is_refused(given, sentence):
+    with pytest.raises(AnswerError, match=sentence):
+        PAIR.checked(given)
+
+
+def test_weights_get_a_sum_of_one():
+    assert WEIGHTS.checked([1, 3]) == WEIGHTS.checked(np.array([0.25, 0.75])) == (0.25, 0.75)
+
+
+@pytest.mark.parametrize("given", [[1], [0, 0], [1, -1], [1, float("inf")], None, "ab", [[1, 2]]])
+def test_what_are_no_weights_is_refused(given):
+    with pytest.raises(AnswerError, match="weights must be 2 numbers"):
+        WEIGHTS.checked(given)
+
+
+@pytest.mark.parametrize(("question", "answer"), [(QUESTION, Answer(7, True)), (PAIR, None), (WEIGHTS, (0.25, 0.75))])
+def test_an_answer_to_any_question_is_written_and_read_back(question, answer, tmp_path):
+    record = record_of(question, answer)
+    assert from_json(to_json(record)) == record
+    log = tmp_path / "decisions.jsonl"
+    log.write_text(to_json(record) + "\n", encoding="utf-8")
+    assert read_log(log) == [record]
+    assert question.from_json(question.to_json(answer)) == answer
+
+
+def test_points_are_checked_too():
+    class Three:
+        points = (None, None, None)
+
+    from jmorl.decision.protocol import PointQuestion
+
+    assert PointQuestion.checked(Three(), Choose(np.int64(2))) == Choose(2)
+    assert PointQuestion.checked(Three(), Back(1)) == Back(1)
+    with pytest.raises(AnswerError, match="there is no point 3 among the 3 shown"):
+        PointQuestion.checked(Three(), Choose(3))
+    with pytest.raises(AnswerError, match="choose_point must return Choose, Back or Adjust, not 1"):
+        PointQuestion.checked(Three(), 1)
