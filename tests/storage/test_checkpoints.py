@@ -21,7 +21,7 @@ from jmorl.storage.checkpoints import (
 )
 from jmorl.storage.serialization import pack, unpack
 from jmorl.storage.versions import NewerFormat
-from tests.storage.test_packing import assert_same
+from tests.storage.test_serialization import assert_same
 
 LOGS = {"metrics.csv": "generation,steps\r\n0,17\r\n", "decisions.jsonl": "", "policies.csv": "größer\r\n"}
 
