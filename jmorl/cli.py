@@ -20,6 +20,7 @@ from jmorl.arguments import SETTING, parse
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.signals import Interrupted, StopSignals
+from jmorl.storage.layout import Layout
 
 if TYPE_CHECKING:
     from jmorl.storage.resume import Continued
@@ -83,14 +84,14 @@ def _resume(options: argparse.Namespace) -> None:
     from jmorl.storage.resume import AlreadyFinished, resume
     from jmorl.storage.stored_run import read_run
 
-    if not (options.run / "result.json").exists():
+    if not Layout(options.run).result.exists():
         _check_json(options, _stored_user(options.run))
     try:
         continued = resume(options.run)
     except AlreadyFinished as finished:
         if not options.quiet:
             print(f"jmorl: {finished}", file=sys.stderr)
-        draw_run(read_run(options.run), options.run / "plots")  # it may have been killed in doing so
+        draw_run(read_run(options.run), Layout(options.run).plots)  # it may have been killed in doing so
         return
     _follow(continued, options)
 
@@ -155,11 +156,11 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
         error.add_note(f"what the run had is kept; go on with: jmorl resume {path}")
         raise
     stored = read_run(path)
-    draw_run(stored, path / "plots")
+    draw_run(stored, Layout(path).plots)
     if kind in ("live", "lines"):
         megabytes, generations = folder_bytes(path) / 1e6, len(stored.metrics["generation"])
         size = f"{megabytes:.1f} MB, {megabytes / generations:.1f} for each generation"
-        where = f"Everything is in {path} ({size}), the chosen policy in {path / 'chosen.npz'}."
+        where = f"Everything is in {path} ({size}), the chosen policy in {Layout(path).chosen}."
         console.print(where, soft_wrap=True, highlight=False)
 
 
@@ -231,7 +232,7 @@ def _check_json(options: argparse.Namespace, user: str) -> None:
 def _stored_user(run: Path) -> str:
     """Whom the run in a folder asks. What is wrong with the folder is said by those who read it."""
     try:
-        return resolve(file=run / "config.toml").user
+        return resolve(file=Layout(run).config).user
     except ConfigError:
         return ""
 
@@ -318,7 +319,7 @@ def _enautilus(options: argparse.Namespace) -> None:
     user = _decision_maker(options.user or stored.config.user, stored.objectives)
     chosen = choose_afterwards(stored, user, options.iterations, options.points)
     if options.json:
-        print((options.run / "enautilus.json").read_text(), end="")
+        print(Layout(options.run).enautilus.read_text(), end="")
     else:
         Console().print(front_table(stored.front, stored.objectives, chosen_id=chosen.id))
 
@@ -334,7 +335,7 @@ def _show(options: argparse.Namespace) -> None:
     console = Console()
     for table in run_tables(stored):
         console.print(table)
-    for plot in draw_run(stored, options.run / "plots"):
+    for plot in draw_run(stored, Layout(options.run).plots):
         console.print(f"plot: {plot}", soft_wrap=True, highlight=False)
 
 

@@ -18,6 +18,7 @@ from jmorl.learning.population import Population, TrainingFault
 from jmorl.learning.stack import Seat, Stack
 from jmorl.paper.plan import Cell
 from jmorl.paper.record import RunRecord, broken_record, is_record_of, read_record, record_of, write_record
+from jmorl.storage.layout import Layout
 from jmorl.storage.resume import AlreadyFinished, Continued, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
@@ -113,7 +114,7 @@ def _stack(config: Config) -> Stack:
 def _begun(cell: Cell, folder: Path) -> Continued:
     """The run as far as it is; from the beginning if what is there was made with other settings."""
     try:
-        begun = resolve(file=folder / "config.toml").digest() == cell.config.digest()
+        begun = resolve(file=Layout(folder).config).digest() == cell.config.digest()
     except ConfigError:
         begun = False
     if begun:
