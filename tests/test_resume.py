@@ -167,7 +167,7 @@ def test_a_run_in_a_newer_format_is_refused_with_the_version_that_wrote_it(copy)
     ("spoil", "message"),
     [
         (lambda path: shutil.rmtree(path), "is not a run folder: it has no manifest.json"),
-        (lambda path: (path / "config.toml").unlink(), "ended before it began; start it again"),
+        (lambda path: (path / "config.toml").unlink(), "has lost its config.toml; put it back"),
         (lambda path: (path / "manifest.json").write_text("{"), "cannot be read as a run"),
         (lambda path: (path / "config.toml").write_text('env = "nowhere"'), "cannot be used: env: "),
     ],
