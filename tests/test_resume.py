@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import shutil
+import sys
 
 import pytest
 
@@ -12,7 +13,9 @@ from envs import NotAsDeclared
 from jmorl.cli import main
 from jmorl.events import Decided, GenerationFinished, RunFinished
 from jmorl.loop import run
+from jmorl.storage.layout import Layout
 from jmorl.storage.lock import FolderInUse
+from jmorl.storage.policy_file import load_policy
 from jmorl.storage.resume import AlreadyFinished, CannotContinue, branch, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
@@ -116,6 +119,59 @@ def test_a_lost_policy_file_of_the_front_is_written_again(whole, copy):
     assert front <= after.keys() and all(after[name] == before[name] for name in after)
 
 
+def empty(path):
+    path.write_bytes(b"")
+
+
+def four_bytes_changed(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3 : len(content) // 3 + 4] = b"ABCD"
+    path.write_bytes(content)
+
+
+def another(path):
+    """A file that can be read, and is of another policy."""
+    other = next(each for each in sorted(path.parent.iterdir()) if each != path)
+    shutil.copyfile(other, path)
+
+
+@pytest.mark.parametrize("spoil", [empty, four_bytes_changed, another])
+def test_a_damaged_policy_file_is_named_and_written_again(whole, copy, spoil):
+    chosen = json.loads((whole / "result.json").read_text())["chosen"]["policy"]
+    damaged = Layout(copy).policy(chosen)
+    spoil(damaged)
+    _, notes = go_on(copy)
+    assert notes == (f"{damaged} was damaged, and is written again from the checkpoint",)
+    assert outcome(copy) == outcome(whole)
+    assert same_network(Layout(copy).chosen, Layout(whole).chosen)
+
+
+def same_network(one, other):
+    layers = [[array.tobytes() for layer in load_policy(path).layers for array in layer] for path in (one, other)]
+    return layers[0] == layers[1]
+
+
+def test_a_damaged_policy_file_that_cannot_be_written_again_is_named(whole, copy, small_config, tmp_path):
+    """Of a policy that is neither in the archive nor in the buffer any more."""
+    config = small_config.replace(search={"buffer_bins": 1, "buffer_size": 1})
+    path = train(tmp_path / "run", config, events=8)  # up to the last generation
+    continued = resume(path)
+    continued.folder.close()
+    state = continued.state
+    known = {policy.id for policy in (*state.archive.members, *state.buffer.members, state.choice)}
+    forgotten = Layout(path).policy(min(set(range(state.policies)) - known))
+    empty(forgotten)
+    _, notes = go_on(path)
+    assert notes == (f"{forgotten} is damaged, and the checkpoint does not have this policy any more",)
+    assert forgotten.read_bytes() == b""
+
+
+def test_what_is_sound_is_not_written_again(copy):
+    before = {file: file.stat().st_mtime_ns for file in Layout(copy).policy_files.iterdir()}
+    resume(copy).folder.close()
+    assert {file: file.stat().st_mtime_ns for file in Layout(copy).policy_files.iterdir()} == before
+
+
 def test_a_folder_may_be_moved_and_renamed(whole, copy, tmp_path):
     moved = tmp_path / "another place" / "with another name"
     moved.parent.mkdir()
@@ -176,6 +232,41 @@ def test_a_folder_that_cannot_be_resumed_says_why(copy, spoil, message):
     spoil(copy)
     with pytest.raises(CannotContinue, match=message):
         resume(copy)
+
+
+@pytest.mark.parametrize("left", [[], [".config.toml.partial"], ["run.lock"]])
+def test_a_run_that_was_killed_before_it_had_a_config_can_be_begun(whole, small_config, tmp_path, left):
+    """The one that cannot be resumed is one that `train` takes."""
+    path = tmp_path / "run"
+    path.mkdir()
+    shutil.copyfile(whole / "manifest.json", path / "manifest.json")
+    for name in left:
+        (path / name).touch()
+    with pytest.raises(CannotContinue, match="ended before it began; start it again with `jmorl train`"):
+        resume(path)
+    assert outcome(train(path, small_config))[1:] == outcome(whole)[1:]
+    assert not (path / ".config.toml.partial").exists()
+
+
+def test_a_run_that_has_lost_its_config_is_not_overwritten(copy, small_config):
+    (copy / "config.toml").unlink()
+    with pytest.raises(FolderInUse, match="without its config.toml; put that back and continue the run"):
+        train(copy, small_config)
+    assert (copy / "policies.csv").exists()
+
+
+def test_a_run_that_ends_while_another_process_takes_it_up_is_left_alone(copy, whole, monkeypatch):
+    """Its result appears after it was looked for, and before it was locked."""
+    locked = sys.modules["jmorl.storage.resume"]._locked
+
+    def ended(path):
+        shutil.copyfile(whole / "result.json", path / "result.json")
+        return locked(path)
+
+    monkeypatch.setattr("jmorl.storage.resume._locked", ended)
+    with pytest.raises(AlreadyFinished):
+        resume(copy)
+    assert outcome(copy) == outcome(whole)
 
 
 @pytest.fixture

@@ -105,17 +105,10 @@ class CheckpointWriter:
             write_checkpoint(self.folder, Checkpoint(state.generation, self.run, pack(state), logs))
             for generation in stored_generations(self.folder)[: -self.keep]:
                 remove(checkpoint_path(self.folder, generation))
-        except Exception as error:  # Orbax has several of its own for a full disk
-            problem = f"the checkpoint of generation {state.generation} could not be written: {_reason(error)}"
+        except Exception as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+            problem = f"the checkpoint of generation {state.generation} could not be written: {reason}"
             raise CheckpointError(problem) from error
-
-
-def _reason(error: Exception) -> str:
-    """Return the system's own words for what went wrong. Orbax has its number somewhere in a long text."""
-    number = re.search(r"os_error_code='(\d+)'", str(error))
-    if number:
-        return os.strerror(int(number[1]))
-    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
 
 
 def stored_generations(folder: Path) -> list[int]:
@@ -166,9 +159,9 @@ def read_checkpoint(folder: Path, generation: int) -> Checkpoint:
     for name, fingerprint in document["files"].items():
         _check(layout.root / name, fingerprint)
     try:
-        logs = {name: (layout.root / name).read_bytes().decode() for name in document["logs"]}
+        logs = {name: _bytes(layout.root / name).decode() for name in document["logs"]}
         arrays = read_arrays(layout.arrays)
-    except (ArraysError, FileNotFoundError, UnicodeDecodeError) as error:
+    except (ArraysError, UnicodeDecodeError) as error:
         raise DamagedCheckpoint(f"{layout.root} is damaged: {error}") from error
     return Checkpoint(generation, document["run"], PackedState(document["state"], arrays), logs)
 

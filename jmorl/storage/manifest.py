@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 from typing_extensions import TypedDict
 
 from jmorl.config import Config
-from jmorl.storage.documents import check_fields, json_object
+from jmorl.storage.documents import DocumentError, check_fields, json_object
 from jmorl.storage.layout import Layout
 from jmorl.storage.versions import check_format
 
@@ -84,9 +84,19 @@ def read_manifest(folder: Path) -> Manifest:
     """Read the manifest of a run. Raises OSError, DocumentError for one that is damaged, and NewerFormat."""
     path = Layout(folder).manifest
     manifest = json_object(path.read_bytes(), str(path))
-    check_format(manifest, FORMAT, str(folder))
+    check_format(manifest, FORMAT, str(path))
     check_fields(manifest, _MANIFEST, str(path))
     return manifest
+
+
+def check_config(folder: Path, manifest: Manifest, config: Config) -> None:
+    """Raise DocumentError unless the config in a folder is the one that its run was started with."""
+    if config.digest() != manifest["config"]:
+        raise DocumentError(
+            f"{Layout(folder).config} is not what run {manifest['run']} was started with (by jmorl "
+            f"{manifest['packages'].get('jmorl')}: {manifest['config']}, now: {config.digest()}); restore it, or start "
+            "a run of its own with `jmorl train --config`"
+        )
 
 
 def differences(before: Manifest, here: Manifest) -> list[str]:

@@ -72,11 +72,15 @@ def resume(path: Path, user: DecisionMaker | None = None) -> Continued:
     CannotContinue, FolderInUse, NewerFormat and NotAsDeclared, having changed nothing.
     """
     manifest, config = read_start(path)
-    _check_unfinished(path)
+    ended = AlreadyFinished(f"the run in {path} has ended; there is nothing to resume")
+    if Layout(path).result.exists():
+        _tidy(path)
+        raise ended
     environment = _environment(config)
     user = user or _its_user(path, config, environment)
     with _locked(path) as lock:
-        _check_unfinished(path)  # its process may have ended since
+        if Layout(path).result.exists():  # since it was looked for
+            raise ended
         found, notes = last_good(path, manifest, config, environment)
         if found is None and manifest.get("parent"):
             raise CannotContinue(
@@ -119,13 +123,6 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
     except BaseException:
         folder.close()
         raise
-
-
-def _check_unfinished(path: Path) -> None:
-    """Raise AlreadyFinished for a run that has a result."""
-    if Layout(path).result.exists():
-        _tidy(path)
-        raise AlreadyFinished(f"the run in {path} has ended; there is nothing to resume")
 
 
 def _environment(config: Config) -> Environment[Any]:

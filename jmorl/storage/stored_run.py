@@ -19,7 +19,7 @@ from jmorl.search.policy import Policy
 from jmorl.storage.csv_log import read_rows
 from jmorl.storage.documents import check_fields, json_object
 from jmorl.storage.layout import Layout
-from jmorl.storage.manifest import read_manifest
+from jmorl.storage.manifest import check_config, read_manifest
 from jmorl.storage.versions import NewerFormat
 from jmorl.units import measured_in
 
@@ -77,6 +77,7 @@ def read_run(path: Path) -> StoredRun:
     with _reading(path):
         manifest = read_manifest(path)
         config = resolve(file=layout.config)
+        check_config(path, manifest, config)
         objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
         decisions = tuple(read_log(layout.decisions)) if layout.decisions.exists() else ()
         result = _result(layout.result) if layout.result.exists() else None
@@ -86,7 +87,7 @@ def read_run(path: Path) -> StoredRun:
         policies = _policies(read_rows(layout.policies), objectives)
     with _reading(layout.front):
         by_id = {policy.id: policy for policy in policies}
-        front = tuple(by_id[int(row["policy"])] for row in read_rows(layout.front))
+        front = tuple(by_id[_whole_number(row["policy"])] for row in read_rows(layout.front))
     generations = len(metrics["generation"])
     decisions = tuple(record for record in decisions if record.generation <= generations)
     run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result)
@@ -105,8 +106,11 @@ def _reading(path: Path) -> Iterator[None]:
         raise StoredRunError(f"{path} cannot be read: it has no {error}") from error
     except OSError as error:
         raise StoredRunError(f"{error.filename or path} cannot be read: {error.strerror}") from error
-    except (ValueError, TypeError, IndexError, ConfigError, ScriptError) as error:
-        raise StoredRunError(f"{path} cannot be read: {error}") from error
+    except ConfigError as error:
+        raise StoredRunError(f"{Layout(path).config} cannot be used: {'; '.join(error.problems)}") from error
+    except (ValueError, TypeError, IndexError, ScriptError) as error:
+        named = str(path) in str(error)
+        raise StoredRunError(str(error) if named else f"{path} cannot be read: {error}") from error
 
 
 def _result(path: Path) -> Mapping[str, Any]:
@@ -127,7 +131,7 @@ def _metrics(rows: list[dict[str, str]]) -> Mapping[str, np.ndarray]:
 
 def _policies(rows: list[dict[str, str]], objectives: tuple[Objective, ...]) -> tuple[Policy, ...]:
     policies = tuple(_policy(row, objectives) for row in rows)
-    if [policy.id for policy in policies] != list(range(len(policies))):
+    if not policies or [policy.id for policy in policies] != list(range(len(policies))):
         raise ValueError("its policies are not 0, 1, 2 and so on")
     return policies
 
@@ -154,7 +158,15 @@ def _check_together(run: StoredRun) -> None:
 
 
 def _number(cell: str) -> float:
-    return float(cell) if cell else np.nan
+    """Return the number of a cell; NaN for an empty one, and for infinity, of which nothing can be drawn."""
+    number = float(cell) if cell else np.nan
+    return number if np.isfinite(number) else np.nan
+
+
+def _whole_number(cell: str) -> int:
+    if not cell.isdecimal():
+        raise ValueError(f"{cell!r} is not a whole number")
+    return int(cell)
 
 
 def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy:
@@ -173,9 +185,9 @@ def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy
         return None if np.isnan(vector(prefix)).any() else vector(prefix)
 
     return Policy(
-        id=int(row["policy"]),
-        generation=int(row["generation"]),
-        parent=int(row["parent"]) if row["parent"] else None,
+        id=_whole_number(row["policy"]),
+        generation=_whole_number(row["generation"]),
+        parent=_whole_number(row["parent"]) if row["parent"] else None,
         weights=needed("weight"),
         values=needed("value"),
         std=vector("std"),

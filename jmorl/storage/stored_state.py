@@ -10,7 +10,7 @@ from jmorl.state import RunState
 from jmorl.storage.checkpoints import Checkpoint, DamagedCheckpoint, read_checkpoint, stored_generations
 from jmorl.storage.documents import DocumentError
 from jmorl.storage.layout import Layout, checkpoint_path
-from jmorl.storage.manifest import Manifest, read_manifest
+from jmorl.storage.manifest import Manifest, check_config, read_manifest
 from jmorl.storage.run_folder import has_begun
 from jmorl.storage.serialization import PackingError, unpack
 
@@ -31,18 +31,13 @@ def read_start(path: Path) -> tuple[Manifest, Config]:
     try:
         manifest = read_manifest(path)
         config = resolve(file=layout.config)
+        check_config(path, manifest, config)
     except ConfigError as error:
         raise CannotContinue(f"{layout.config} cannot be used: {'; '.join(error.problems)}") from error
     except DocumentError as error:
         raise CannotContinue(f"{path} cannot be read as a run: {error}") from error
     except OSError as error:
         raise CannotContinue(f"{path} cannot be read as a run: {error.filename}: {error.strerror}") from error
-    if config.digest() != manifest["config"]:
-        raise CannotContinue(
-            f"{layout.config} is not what run {manifest['run']} was started with (by jmorl "
-            f"{manifest['packages'].get('jmorl')}: {manifest['config']}, now: {config.digest()}); restore it, or start "
-            "a run of its own with `jmorl train --config`"
-        )
     return manifest, config
 
 
