@@ -93,9 +93,9 @@ def _own_checkpoint(path: Path, generation: int, manifest: Manifest) -> Checkpoi
 
 
 def _unpacked(path: Path, checkpoint: Checkpoint, config: Config, environment: Environment[Any]) -> RunState:
-    """Return the state in a checkpoint.
+    """Return the state in a checkpoint. Raises CannotContinue if the run has no such states now.
 
-    Raises CannotContinue if the run has no such states now, and DamagedCheckpoint for what is no state at all.
+    Its bytes are as they were written, so that an earlier checkpoint would not do either.
     """
     place = checkpoint_path(Layout(path).checkpoints, checkpoint.generation)
     try:
@@ -105,7 +105,7 @@ def _unpacked(path: Path, checkpoint: Checkpoint, config: Config, environment: E
     except PackingError as error:
         raise CannotContinue(f"{place} does not fit this jmorl: {error}") from error
     except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
-        raise DamagedCheckpoint(f"{place} is damaged: its state cannot be read ({error!r})") from error
+        raise CannotContinue(f"{place} does not fit this jmorl: its state cannot be read ({error!r})") from error
 
 
 def _check_counters(state: RunState, generation: int) -> None:

@@ -130,36 +130,61 @@ def test_a_manifest_may_have_more_fields(run, capsys):
     assert json.loads(run.manifest.read_text())["mood"] == "good"
 
 
-# What Orbax was about to do when it failed may come to its end later, without its event loop.
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda document: document.pop("state"),
-        lambda document: document.update(state={}),
-        lambda document: document.update(state=[]),
-        lambda document: document.update(files=None),
-        lambda document: document.update(logs=["metrics.csv", "nowhere.csv"]),
-        lambda document: document.update(generation=2),
-        lambda document: document["state"]["counters"].update(policies="many"),
-        lambda document: document["state"]["counters"].update(generation=7),
-        lambda document: document["state"].update(archive=[10**9]),
-        lambda document: document["state"]["policies"].clear(),
-        lambda document: document["files"].clear(),
-    ],
-)
-def test_a_checkpoint_with_a_valid_digest_and_odd_content_is_passed_over_and_named(run, capsys, change):
+def changed_checkpoint(run, change):
+    """The last checkpoint with another document, whose digest is right; its folder."""
     place = CheckpointLayout(checkpoint_path(run.checkpoints, 3))
     document = json.loads(place.document.read_text().splitlines()[0])
     change(document)
     line = json.dumps(document) + "\n"
     place.document.write_text(line + hashlib.sha256(line.encode()).hexdigest() + "\n")
-    if document.get("files") == {}:
-        place.arrays.joinpath("manifest.ocdbt").unlink()
+    return place
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda document: document.pop("state"),
+        lambda document: document.update(state=[]),
+        lambda document: document.update(files=None),
+        lambda document: document.update(logs=["metrics.csv", "nowhere.csv"]),
+        lambda document: document.update(generation=2),
+    ],
+)
+def test_a_checkpoint_with_a_valid_digest_and_odd_content_is_passed_over_and_named(run, capsys, change):
+    place = changed_checkpoint(run, change)
     code, errors = said_by("branch", run, capsys)
     assert code == 2 and str(place.root) in errors and errors.count("\n") == 1
     code, errors = said_by("resume", run, capsys)
     assert code == 0 and str(place.root) in errors and "goes on from generation 2 instead" in errors
+
+
+# What Orbax was about to do when it failed may come to its end later, without its event loop.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_checkpoint_that_orbax_cannot_read_is_passed_over_and_named(run, capsys):
+    place = changed_checkpoint(run, lambda document: document["files"].clear())
+    place.arrays.joinpath("manifest.ocdbt").unlink()
+    code, errors = said_by("resume", run, capsys)
+    assert code == 0 and f"{place.root} is damaged: " in errors and "goes on from generation 2 instead" in errors
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda state: state.clear(),
+        lambda state: state["counters"].update(policies="many"),
+        lambda state: state["counters"].update(generation=7),
+        lambda state: state.update(archive=[10**9]),
+        lambda state: state["policies"].clear(),
+    ],
+)
+def test_a_state_that_is_not_understood_is_refused_and_nothing_changed(run, capsys, change):
+    """It is as it was written: another version may understand it, and would miss what is deleted."""
+    place = changed_checkpoint(run, lambda document: change(document["state"]))
+    for command in ("branch", "resume"):
+        before = {file: file.read_bytes() for file in run.root.rglob("*") if file.is_file() and file != run.result}
+        code, errors = said_by(command, run, capsys)
+        assert code == 2 and f"{place.root} does not fit this jmorl: " in errors and errors.count("\n") == 1
+        assert {file: file.read_bytes() for file in before} == before
 
 
 @pytest.mark.parametrize("what", ["a file", "a folder without anything"])
