@@ -31,6 +31,7 @@ from jmorl.decision.protocol import Question
 from jmorl.display.console import PlainConsole
 from jmorl.search.policy import Policy
 from jmorl.state import Prospect
+from jmorl.storage.layout import Layout
 from jmorl.storage.stored_run import read_run
 from jmorl.studio.session import Session
 from jmorl.studio.view import Generation, View
@@ -183,7 +184,7 @@ def _follow(path: Path, with_page: bool, playing: bool) -> None:
     with browser_page() if with_page else nullcontext() as page:
         if page and playing:
             page.locator(".policies-row").first.click(timeout=300_000)
-        while not (path / "result.json").exists():
+        while not Layout(path).result.exists():
             time.sleep(0.5)
 
 

@@ -80,3 +80,25 @@ def _changes(start: Any, after: Any) -> list[str]:
 
 def _name(environment: Environment[Any]) -> str:
     return getattr(environment, "id", type(environment).__name__)
+
+
+def check_same(environment: Environment[Any], expected: Environment[Any], name: str) -> None:
+    """Raise NotAsDeclared unless an environment is the `expected` one, called `name`, as far as a run can tell.
+
+    It may be of another class if it declares the same, or of the same class with another id.
+    """
+    names = ["objectives", *COUNTS, "action_low", "action_high"]
+    if type(environment) is not type(expected):
+        names.append("id")
+    pairs = {each: (getattr(environment, each, None), getattr(expected, each, None)) for each in names}
+    wrong = [f"{each} is {one!r}, not {other!r}" for each, (one, other) in pairs.items() if not _equal(one, other)]
+    if wrong:
+        raise NotAsDeclared(
+            f"environment {_name(environment)} is not {name}, which the config names: {'; '.join(wrong)}; name the one "
+            "that is to be used in the config, and register it first if it is your own"
+        )
+
+
+def _equal(one: Any, other: Any) -> bool:
+    """Return whether two values, or arrays, are the same."""
+    return bool(np.array_equal(one, other))

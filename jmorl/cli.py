@@ -22,6 +22,7 @@ from jmorl.display.characters import substitute_in
 from jmorl.display.commands import command
 from jmorl.module_path import working_directory_last
 from jmorl.signals import Interrupted, StopSignals
+from jmorl.storage.layout import Layout
 
 if TYPE_CHECKING:
     from jmorl.display.console import PlainConsole
@@ -88,7 +89,7 @@ def _resume(options: argparse.Namespace) -> None:
     from jmorl.storage.resume import AlreadyFinished, resume
     from jmorl.storage.stored_run import read_run
 
-    if not (options.run / "result.json").exists():
+    if not Layout(options.run).result.exists():
         _check_json(options, _stored_user(options.run))
     try:
         continued = resume(options.run)
@@ -162,7 +163,7 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     if kind in ("live", "lines"):
         megabytes, generations = folder_bytes(path) / 1e6, len(stored.metrics["generation"])
         size = f"{megabytes:.1f} MB, {megabytes / generations:.1f} for each generation"
-        where = f"Everything is in {path} ({size}), the chosen policy in {path / 'chosen.npz'}."
+        where = f"Everything is in {path} ({size}), the chosen policy in {Layout(path).chosen}."
         console.print(where, soft_wrap=True)
 
 
@@ -178,7 +179,7 @@ def _draw(run: "StoredRun") -> None:
     from jmorl.report.plots import PlotError, draw_run
 
     try:
-        draw_run(run, run.path / "plots")
+        draw_run(run, Layout(run.path).plots)
     except PlotError as error:
         again = f"the run is complete, and {command('show', run.path)} draws it again"
         print(f"jmorl: {error}; {again}", file=sys.stderr)
@@ -251,7 +252,7 @@ def _check_json(options: argparse.Namespace, user: str) -> None:
 def _stored_user(run: Path) -> str:
     """Whom the run in a folder asks. What is wrong with the folder is said by those who read it."""
     try:
-        return resolve(file=run / "config.toml").user
+        return resolve(file=Layout(run).config).user
     except ConfigError:
         return ""
 
@@ -337,7 +338,7 @@ def _enautilus(options: argparse.Namespace) -> None:
     user = _decision_maker(options.user or stored.config.user, stored.objectives)
     chosen = choose_afterwards(stored, user, options.iterations, options.points)
     if options.json:
-        print((options.run / "enautilus.json").read_text(encoding="utf-8"), end="")
+        print(Layout(options.run).enautilus.read_text(encoding="utf-8"), end="")
     else:
         PlainConsole().print(front_table(stored.front, stored.objectives, chosen_id=chosen.id))
 
@@ -352,7 +353,7 @@ def _show(options: argparse.Namespace) -> None:
     console = PlainConsole()
     for table in run_tables(stored):
         console.print(table)
-    for plot in draw_run(stored, options.run / "plots"):
+    for plot in draw_run(stored, Layout(options.run).plots):
         console.print(f"plot: {plot}", soft_wrap=True)
 
 

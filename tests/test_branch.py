@@ -9,7 +9,9 @@ import pytest
 
 import envs
 from jmorl.config import ConfigError
+from jmorl.storage.layout import Layout
 from jmorl.storage.lock import FolderInUse
+from jmorl.storage.policy_file import load_policy
 from jmorl.storage.resume import CannotContinue, branch, resume
 from tests.probes import ThreeWays
 from tests.resuming import Counting, follow, go_on, outcome, train
@@ -72,6 +74,22 @@ def test_a_branch_whose_script_cannot_be_read_is_not_made(whole, tmp_path):
         with pytest.raises(ConfigError, match=f"^user: .*{message}"):
             branch(whole, 1, tmp_path / "new", f"script={tmp_path / script}")
     assert not (tmp_path / "new").exists()
+
+
+def test_a_damaged_policy_file_is_written_into_a_branch_from_the_checkpoint_or_left_out(whole, tmp_path):
+    copy = Layout(shutil.copytree(whole, tmp_path / "copy"))
+    sound = branch(copy.root, 1, tmp_path / "sound").folder
+    sound.close()
+    for file in copy.policy_files.iterdir():
+        file.write_bytes(file.read_bytes()[:-100])
+    continued = branch(copy.root, 1, tmp_path / "new")
+    continued.folder.close()
+    files = {file.name for file in sound.layout.policy_files.iterdir()}
+    assert {file.name for file in continued.folder.layout.policy_files.iterdir()} == files
+    for name in files:
+        load_policy(continued.folder.layout.policy_files / name)
+        assert f"{copy.policy_files / name} was damaged, and is written again from the checkpoint" in continued.notes
+    assert len(continued.notes) == len(files)
 
 
 def test_a_checkpoint_of_another_run_is_not_branched_off(whole, small_config, tmp_path):

@@ -72,7 +72,7 @@ def test_a_signal_while_somebody_is_asked_does_not_wait_for_an_answer(small_conf
 def test_a_full_disk_ends_the_run_with_what_it_had_and_it_can_go_on(whole, small_config, tmp_path, monkeypatch, capsys):
     config, path = tmp_path / "config.toml", tmp_path / "run"
     config.write_text(small_config.to_toml())
-    write, calls = checkpoints._write_arrays, []
+    write, calls = checkpoints.write_arrays, []
 
     def full(*arguments):
         calls.append(arguments)
@@ -81,7 +81,7 @@ def test_a_full_disk_ends_the_run_with_what_it_had_and_it_can_go_on(whole, small
         write(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(checkpoints, "_write_arrays", full)
+        patch.setattr(checkpoints, "write_arrays", full)
         assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 1
     errors = capsys.readouterr().err
     assert "of generation 2 could not be written" in errors and "No space left" in errors and "go on with" in errors

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import shutil
+import sys
 
 import pytest
 
@@ -12,13 +13,17 @@ from envs import NotAsDeclared
 from jmorl.cli import main
 from jmorl.events import Decided, GenerationFinished, RunFinished
 from jmorl.loop import run
+from jmorl.storage.layout import Layout
 from jmorl.storage.lock import FolderInUse
+from jmorl.storage.policy_file import load_policy
 from jmorl.storage.resume import AlreadyFinished, CannotContinue, branch, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 from jmorl.storage.versions import NewerFormat
 from tests.probes import ThreeWays
 from tests.resuming import Counting, follow, go_on, outcome, train
+
+RESUME = sys.modules["jmorl.storage.resume"]
 
 
 @pytest.fixture
@@ -116,6 +121,63 @@ def test_a_lost_policy_file_of_the_front_is_written_again(whole, copy):
     assert front <= after.keys() and all(after[name] == before[name] for name in after)
 
 
+def empty(path):
+    path.write_bytes(b"")
+
+
+def four_bytes_changed(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3 : len(content) // 3 + 4] = b"ABCD"
+    path.write_bytes(content)
+
+
+def another(path):
+    """A file that can be read, and is of another policy."""
+    other = next(each for each in sorted(path.parent.iterdir()) if each != path)
+    shutil.copyfile(other, path)
+
+
+@pytest.mark.parametrize("spoil", [empty, four_bytes_changed, another])
+def test_a_damaged_policy_file_is_named_and_written_again(whole, copy, spoil):
+    chosen = json.loads((whole / "result.json").read_text())["chosen"]["policy"]
+    damaged = Layout(copy).policy(chosen)
+    spoil(damaged)
+    _, notes = go_on(copy)
+    assert notes == (f"{damaged} was damaged, and is written again from the checkpoint",)
+    assert outcome(copy) == outcome(whole)
+    assert same_network(Layout(copy).chosen, Layout(whole).chosen)
+
+
+def same_network(one, other):
+    layers = [[array.tobytes() for layer in load_policy(path).layers for array in layer] for path in (one, other)]
+    return layers[0] == layers[1]
+
+
+def test_a_damaged_policy_file_that_cannot_be_written_again_is_named(copy, tmp_path, monkeypatch):
+    """As of a policy that neither archive nor buffer have any more; in runs as small as these they have all."""
+    forgotten = max(Layout(copy).policy_files.iterdir())
+    with_snapshots = RESUME._with_snapshots
+    monkeypatch.setattr(
+        RESUME,
+        "_with_snapshots",
+        lambda *arguments: [each for each in with_snapshots(*arguments) if each.id != int(forgotten.stem)],
+    )
+    note = f"{forgotten} is damaged, and the checkpoint does not have this policy any more"
+    empty(forgotten)
+    last = branch(copy, 3, tmp_path / "branch")
+    last.folder.close()
+    assert last.notes == (note,)
+    continued = resume(copy)
+    continued.folder.close()
+    assert continued.notes == (note,) and forgotten.read_bytes() == b""
+
+
+def test_what_is_sound_is_not_written_again(copy):
+    before = {file: file.stat().st_mtime_ns for file in Layout(copy).policy_files.iterdir()}
+    resume(copy).folder.close()
+    assert {file: file.stat().st_mtime_ns for file in Layout(copy).policy_files.iterdir()} == before
+
+
 def test_a_folder_may_be_moved_and_renamed(whole, copy, tmp_path):
     moved = tmp_path / "another place" / "with another name"
     moved.parent.mkdir()
@@ -168,7 +230,7 @@ def test_a_run_in_a_newer_format_is_refused_with_the_version_that_wrote_it(copy)
     ("spoil", "message"),
     [
         (lambda path: shutil.rmtree(path), "is not a run folder: it has no manifest.json"),
-        (lambda path: (path / "config.toml").unlink(), "ended before it began; start it again"),
+        (lambda path: (path / "config.toml").unlink(), "has lost its config.toml; put it back"),
         (lambda path: (path / "manifest.json").write_text("{"), "cannot be read as a run"),
         (lambda path: (path / "config.toml").write_text('env = "nowhere"'), "cannot be used: env: "),
     ],
@@ -177,6 +239,41 @@ def test_a_folder_that_cannot_be_resumed_says_why(copy, spoil, message):
     spoil(copy)
     with pytest.raises(CannotContinue, match=message):
         resume(copy)
+
+
+@pytest.mark.parametrize("left", [[], [".config.toml.partial"], ["run.lock"]])
+def test_a_run_that_was_killed_before_it_had_a_config_can_be_begun(whole, small_config, tmp_path, left):
+    """The one that cannot be resumed is one that `train` takes."""
+    path = tmp_path / "run"
+    path.mkdir()
+    shutil.copyfile(whole / "manifest.json", path / "manifest.json")
+    for name in left:
+        (path / name).touch()
+    with pytest.raises(CannotContinue, match="ended before it began; start it again with `jmorl train`"):
+        resume(path)
+    assert outcome(train(path, small_config))[1:] == outcome(whole)[1:]
+    assert not (path / ".config.toml.partial").exists()
+
+
+def test_a_run_that_has_lost_its_config_is_not_overwritten(copy, small_config):
+    (copy / "config.toml").unlink()
+    with pytest.raises(FolderInUse, match="without its config.toml; put that back and continue the run"):
+        train(copy, small_config)
+    assert (copy / "policies.csv").exists()
+
+
+def test_a_run_that_ends_while_another_process_takes_it_up_is_left_alone(copy, whole, monkeypatch):
+    """Its result appears after it was looked for, and before it was locked."""
+    locked = RESUME._locked
+
+    def ended(path):
+        shutil.copyfile(whole / "result.json", path / "result.json")
+        return locked(path)
+
+    monkeypatch.setattr(RESUME, "_locked", ended)
+    with pytest.raises(AlreadyFinished):
+        resume(copy)
+    assert outcome(copy) == outcome(whole)
 
 
 @pytest.fixture

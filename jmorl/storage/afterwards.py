@@ -12,6 +12,7 @@ from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import PointRecord, point_record, to_json
 from jmorl.search.policy import Policy
 from jmorl.storage.files import write_json, write_text
+from jmorl.storage.layout import Layout
 from jmorl.storage.stored_run import StoredRun
 
 
@@ -33,5 +34,5 @@ def choose_afterwards(run: StoredRun, user: DecisionMaker, iterations: int, poin
 
 def keep_dialogue(path: Path, records: Sequence[PointRecord], chosen: Policy) -> None:
     """Write a dialogue that has come to its end into the run folder, in place of an earlier one."""
-    write_text(path / "enautilus.jsonl", "".join(to_json(record) + "\n" for record in records))
-    write_json(path / "enautilus.json", {"policy": chosen.id, "values": chosen.values.tolist()})
+    write_text(Layout(path).enautilus_log, "".join(to_json(record) + "\n" for record in records))
+    write_json(Layout(path).enautilus, {"policy": chosen.id, "values": chosen.values.tolist()})

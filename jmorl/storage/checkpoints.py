@@ -1,6 +1,6 @@
 """Checkpoints of a run: `checkpoints/GENERATION/`, each on its own enough to go on from.
 
-arrays/          the numbers of the run's state, written by Orbax (`jmorl.storage.serialization`)
+arrays/          the numbers of the run's state (`jmorl.storage.serialization`), written by `jmorl.storage.arrays`
 metrics.csv      the logs as they were then: metrics.csv, policies.csv and decisions.jsonl
 checkpoint.json  one line: versions, the rest of the state, and size and SHA-256 of every other file;
                  a second line: the SHA-256 of the first
@@ -13,6 +13,7 @@ import hashlib
 import importlib.metadata
 import json
 import os
+import re
 import shutil
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -20,17 +21,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 from jmorl.methods.base import Method
 from jmorl.state import RunState
-from jmorl.storage.files import partial_path, sync
+from jmorl.storage.arrays import ArraysError, read_arrays, write_arrays
+from jmorl.storage.documents import DocumentError, check_fields, json_object
+from jmorl.storage.files import partial_path, remove, sync
+from jmorl.storage.layout import CheckpointLayout, checkpoint_path
 from jmorl.storage.serialization import PackedState, from_format_1, pack
 from jmorl.storage.versions import check_format
 
 FORMAT = 2
-DOCUMENT = "checkpoint.json"
-ARRAYS = "arrays"
 
 
 class CheckpointError(RuntimeError):
@@ -49,6 +52,22 @@ class Checkpoint:
     run: str  # the id of the run that wrote it
     state: PackedState
     logs: Mapping[str, str]  # file name -> text
+
+
+class _Fingerprint(TypedDict):
+    bytes: int
+    sha256: str
+
+
+class _Document(TypedDict):
+    run: str
+    generation: int
+    logs: list[str]
+    state: dict[str, Any]
+    files: dict[str, _Fingerprint]  # path in the folder -> what it must be
+
+
+_DOCUMENT = TypeAdapter(_Document)
 
 
 class CheckpointWriter:
@@ -87,30 +106,28 @@ class CheckpointWriter:
         try:
             write_checkpoint(self.folder, Checkpoint(state.generation, self.run, pack(state, self.method), logs))
             for generation in stored_generations(self.folder)[: -self.keep]:
-                shutil.rmtree(checkpoint_path(self.folder, generation))
-        except Exception as error:  # Orbax has several of its own for a full disk
-            problem = f"the checkpoint of generation {state.generation} could not be written: {error}"
+                remove(checkpoint_path(self.folder, generation))
+        except Exception as error:
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+            problem = f"the checkpoint of generation {state.generation} could not be written: {reason}"
             raise CheckpointError(problem) from error
 
 
-def checkpoint_path(folder: Path, generation: int) -> Path:
-    """Where the checkpoint of a generation is, in the folder of all."""
-    return folder / f"{generation:05d}"
-
-
 def stored_generations(folder: Path) -> list[int]:
-    """The generations that have a checkpoint, the earliest first."""
-    return sorted(int(path.name) for path in folder.glob("[0-9]*") if path.name.isdigit())
+    """Return the generations that have a checkpoint, the earliest first."""
+    numbers = (int(path.name) for path in folder.glob("*") if re.fullmatch("[0-9]+", path.name))
+    return sorted(number for number in numbers if checkpoint_path(folder, number).exists())
 
 
 def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint into the folder of all, visible only when it is whole and on the disk."""
     path = checkpoint_path(folder, checkpoint.generation)
     temporary = partial_path(path)
-    shutil.rmtree(temporary, ignore_errors=True)
+    remove(temporary)
+    layout = CheckpointLayout(temporary)
     try:
         temporary.mkdir(parents=True)
-        _write_arrays(temporary / ARRAYS, checkpoint.state.arrays)
+        write_arrays(layout.arrays, checkpoint.state.arrays)
         for name, text in checkpoint.logs.items():
             (temporary / name).write_bytes(text.encode())
         document = {
@@ -123,7 +140,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             "files": {name: _fingerprint(temporary / name) for name in _file_names(temporary)},
         }
         line = json.dumps(document, allow_nan=False) + "\n"
-        (temporary / DOCUMENT).write_text(line + _digest_line(line), encoding="utf-8")
+        layout.document.write_bytes((line + _digest_line(line)).encode())
         for each in (temporary, *temporary.rglob("*")):
             sync(each)
         os.rename(temporary, path)
@@ -137,28 +154,44 @@ def read_checkpoint(folder: Path, generation: int) -> Checkpoint:
 
     Raises DamagedCheckpoint, naming the file, and NewerFormat.
     """
-    path = checkpoint_path(folder, generation)
-    document = _read_document(path / DOCUMENT)
+    layout = CheckpointLayout(checkpoint_path(folder, generation))
+    document = _read_document(layout.document)
+    if document["generation"] != generation:
+        raise DamagedCheckpoint(f"{layout.root} is the checkpoint of generation {document['generation']}")
     for name, fingerprint in document["files"].items():
-        _check(path / name, fingerprint)
-    logs = {name: (path / name).read_bytes().decode() for name in document["logs"]}
-    packed = PackedState(document["state"], _read_arrays(path / ARRAYS))
+        _check(layout.root / name, fingerprint)
+    try:
+        logs = {name: _bytes(layout.root / name).decode() for name in document["logs"]}
+        arrays = read_arrays(layout.arrays)
+    except (ArraysError, UnicodeDecodeError) as error:
+        raise DamagedCheckpoint(f"{layout.root} is damaged: {error}") from error
+    packed = PackedState(document["state"], arrays)
     if document["format"] == 1:
         packed = from_format_1(packed)
-    return Checkpoint(document["generation"], document["run"], packed, logs)
+    return Checkpoint(generation, document["run"], packed, logs)
 
 
 def _read_document(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_bytes()
-    except FileNotFoundError:
-        raise DamagedCheckpoint(f"{path} is missing") from None
-    line, end, digest = text.partition(b"\n")
+    line, end, digest = _bytes(path).partition(b"\n")
     if digest != _digest_line((line + end).decode(errors="replace")).encode():
         raise DamagedCheckpoint(f"{path} is damaged: it is not as it was written")
-    document: dict[str, Any] = json.loads(line)
-    check_format(document, FORMAT, document["jmorl"], str(path))
+    try:
+        document = json_object(line, str(path))
+        check_format(document, FORMAT, str(path))
+        check_fields(document, _DOCUMENT, str(path))
+    except DocumentError as error:
+        raise DamagedCheckpoint(str(error)) from error
     return document
+
+
+def _bytes(path: Path) -> bytes:
+    """Return what a file holds. Raises DamagedCheckpoint."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise DamagedCheckpoint(f"{path} is missing") from None
+    except OSError as error:
+        raise DamagedCheckpoint(f"{path} cannot be read: {error.strerror}") from error
 
 
 def _digest_line(line: str) -> str:
@@ -167,12 +200,10 @@ def _digest_line(line: str) -> str:
 
 def _check(path: Path, fingerprint: Mapping[str, Any]) -> None:
     """Raise DamagedCheckpoint unless the file is as it was written."""
-    if not path.is_file():
-        raise DamagedCheckpoint(f"{path} is missing")
-    size = path.stat().st_size
-    if size != fingerprint["bytes"]:
-        raise DamagedCheckpoint(f"{path} is damaged: it has {size} bytes, not {fingerprint['bytes']}")
-    if _fingerprint(path) != fingerprint:
+    content = _bytes(path)
+    if len(content) != fingerprint["bytes"]:
+        raise DamagedCheckpoint(f"{path} is damaged: it has {len(content)} bytes, not {fingerprint['bytes']}")
+    if hashlib.sha256(content).hexdigest() != fingerprint["sha256"]:
         raise DamagedCheckpoint(f"{path} is damaged: its bytes are not those that were written")
 
 
@@ -184,21 +215,3 @@ def _fingerprint(path: Path) -> dict[str, Any]:
 
 def _file_names(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-
-
-def _write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Uncompressed: the mantissas of trained networks are noise, and compressing them costs more than their bytes."""
-    import orbax.checkpoint as ocp  # takes half a second to import
-
-    handler = ocp.PyTreeCheckpointHandler(use_ocdbt=True, use_compression=False)
-    with ocp.Checkpointer(handler) as checkpointer:
-        checkpointer.save(path.absolute(), dict(arrays))
-    (path / "commit_success.txt").unlink(missing_ok=True)  # names this place, and a run may be moved
-
-
-def _read_arrays(path: Path) -> dict[str, np.ndarray]:
-    import orbax.checkpoint as ocp
-
-    with ocp.PyTreeCheckpointer() as checkpointer:
-        restored: dict[str, np.ndarray] = checkpointer.restore(path.absolute())
-    return restored

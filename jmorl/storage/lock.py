@@ -5,14 +5,17 @@ ends. The file names the holder, and is deleted when a run is left in good order
 locked, tells that its process is gone.
 """
 
-import fcntl
 import json
 import os
 import platform
 import time
 from pathlib import Path
 
-LOCK_FILE = "run.lock"
+from jmorl.storage.layout import Layout
+
+ATTEMPTS = 5  # somebody who only looks whether a folder is locked has the lock for a moment
+MOMENT = 0.01  # seconds
+FIRST = b"{"  # byte of the file. It is the locked one, which Windows lets nobody else read.
 
 
 class FolderInUse(ValueError):
@@ -27,16 +30,17 @@ class RunLock:
     """
 
     def __init__(self, folder: Path):
-        self.path = folder / LOCK_FILE
+        self.path = Layout(folder).lock
         self._descriptor = _locked(self.path)
         self.previous = _holder(self._descriptor)
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         holder = {"pid": os.getpid(), "host": platform.node(), "started": started}
         os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, json.dumps(holder).encode(), 0)
+        os.lseek(self._descriptor, 0, os.SEEK_SET)
+        os.write(self._descriptor, json.dumps(holder).encode())
 
     def release(self) -> None:
-        """Let others have the folder. Where the file cannot be deleted it stays, unlocked."""
+        """Let others have the folder. Where the file cannot be deleted, as on Windows, it stays, unlocked and empty."""
         try:
             self.path.unlink(missing_ok=True)
         except OSError:
@@ -46,17 +50,17 @@ class RunLock:
 
 def check_unlocked(folder: Path) -> None:
     """Raise FolderInUse, naming the process, if one is writing the folder."""
-    path = folder / LOCK_FILE
+    path = Layout(folder).lock
     if path.exists():
         descriptor = os.open(path, os.O_RDONLY)
         try:
-            _lock(descriptor, path, fcntl.LOCK_SH)
+            _lock(descriptor, path)
         finally:
             os.close(descriptor)
 
 
 def _locked(path: Path) -> int:
-    """A descriptor of the lock file, locked."""
+    """Return a descriptor of the lock file, locked."""
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -70,25 +74,31 @@ def _locked(path: Path) -> int:
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
-    """Whether the path still leads to the open file: its last holder may have deleted it before it was locked."""
+    """Return whether the path still leads to the open file, which its last holder may have deleted."""
     try:
         return os.path.samestat(os.fstat(descriptor), path.stat())
     except FileNotFoundError:
         return False
 
 
-def _lock(descriptor: int, path: Path, kind: int = fcntl.LOCK_EX) -> None:
-    try:
-        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-    except BlockingIOError:
-        holder = _holder(descriptor) or "another process"
-        raise FolderInUse(f"{path.parent} is being written by {holder}; wait for it, or end it") from None
+def _lock(descriptor: int, path: Path) -> None:
+    """Lock the open file until the descriptor is closed. Raises FolderInUse if another process has the lock."""
+    from filelock import lock_descriptor  # takes a tenth of a second to import
+
+    for attempt in range(ATTEMPTS):
+        if lock_descriptor(descriptor, blocking=False):
+            return
+        if attempt < ATTEMPTS - 1:
+            time.sleep(MOMENT)
+    holder = _holder(descriptor) or "another process"
+    raise FolderInUse(f"{path.parent} is being written by {holder}; wait for it, or end it")
 
 
 def _holder(descriptor: int) -> str | None:
-    """Who the lock file names, in words; None if it names nobody."""
+    """Return whom the lock file names, in words; None if it names nobody."""
     try:
-        holder = json.loads(os.pread(descriptor, 4096, 0))
+        os.lseek(descriptor, len(FIRST), os.SEEK_SET)
+        holder = json.loads(FIRST + os.read(descriptor, 4096))
         return f"process {holder['pid']} on {holder['host']}, started {holder['started']}"
-    except (ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError):
         return None

@@ -1,7 +1,6 @@
 """manifest.json of a run folder: which run it is, what made it, where, and where it was taken up again."""
 
 import importlib.metadata
-import json
 import platform
 import subprocess
 import sys
@@ -11,14 +10,46 @@ from pathlib import Path
 from typing import Any
 
 import jax
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 from jmorl.config import Config
+from jmorl.storage.documents import DocumentError, check_fields, json_object
+from jmorl.storage.layout import Layout
 from jmorl.storage.versions import check_format
 
 FORMAT = 2
 PACKAGES = ("jmorl", "jax", "jaxlib", "flax", "optax", "numpy", "scipy", "moocore", "orbax-checkpoint")
 
 Manifest = dict[str, Any]
+
+
+class _Parent(TypedDict):
+    run: str
+    name: str
+    generation: int
+
+
+class _Device(TypedDict):
+    kind: str
+    platform: str
+    count: int
+
+
+class _Manifest(TypedDict):
+    """What is relied on of a manifest; there may be more."""
+
+    run: str
+    parent: _Parent | None
+    started: str
+    config: str
+    commit: str | None
+    packages: dict[str, str]
+    device: _Device
+    resumed: list[dict[str, Any]]
+
+
+_MANIFEST = TypeAdapter(_Manifest)
 
 
 def new_manifest(config: Config, parent: Manifest | None = None) -> Manifest:
@@ -50,10 +81,22 @@ def circumstances() -> Manifest:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Raises OSError and ValueError if there is none that can be read, and NewerFormat."""
-    manifest: Manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    check_format(manifest, FORMAT, manifest.get("packages", {}).get("jmorl"), str(folder))
+    """Read the manifest of a run. Raises OSError, DocumentError for one that is damaged, and NewerFormat."""
+    path = Layout(folder).manifest
+    manifest = json_object(path.read_bytes(), str(path))
+    check_format(manifest, FORMAT, str(path))
+    check_fields(manifest, _MANIFEST, str(path))
     return manifest
+
+
+def check_config(folder: Path, manifest: Manifest, config: Config) -> None:
+    """Raise DocumentError unless the config in a folder is the one that its run was started with."""
+    if not config.is_identified_by(manifest["config"]):
+        raise DocumentError(
+            f"{Layout(folder).config} is not what run {manifest['run']} was started with (by jmorl "
+            f"{manifest['packages'].get('jmorl')}: {manifest['config']}, now: {config.identity()}); restore it, or "
+            "start a run of its own with `jmorl train --config`"
+        )
 
 
 def differences(before: Manifest, here: Manifest) -> list[str]:

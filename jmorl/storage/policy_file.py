@@ -6,25 +6,57 @@ observation statistics. `load_policy(path)(observation)` is the deterministic ac
 """
 
 import importlib.metadata
+import io
 import json
 import shutil
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 import envs
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
 from jmorl.search.policy import Policy
+from jmorl.storage.documents import DocumentError, check_fields, json_object
 from jmorl.storage.files import written_whole
+from jmorl.storage.layout import Layout
 from jmorl.storage.versions import NewerFormat, check_format
 
 FORMAT = 1
 INPUT = {"variance_floor": VARIANCE_FLOOR, "clip": NORMALIZED_CLIP}
+
+
+class _Objective(TypedDict):
+    name: str
+    label: str
+    unit: str
+
+
+class _Network(TypedDict):
+    variance_floor: float
+    clip: float
+
+
+class _Header(TypedDict):
+    """What is relied on of a header; there may be more."""
+
+    environment: str
+    objectives: list[_Objective]
+    action_limits: list[Any]
+    id: int
+    values: list[float]
+    discount: float
+    network: _Network
+
+
+_HEADER = TypeAdapter(_Header)
 
 
 class PolicyFileError(ValueError):
@@ -64,8 +96,6 @@ def save_policy(
 
     `run` is the id in the run's manifest, if it has one.
     """
-    parameters = policy.snapshot.parameters["actor"]["params"]
-    layers = [parameters["MLP_0"][f"Dense_{index}"] for index in range(len(parameters["MLP_0"]))]
     header = {
         "format": FORMAT,
         "jmorl": importlib.metadata.version("jmorl"),
@@ -89,17 +119,34 @@ def save_policy(
             **INPUT,
         },
     }
-    statistics = policy.snapshot.observation_statistics
+    with written_whole(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, header=np.array(json.dumps(header)), **_network(policy))
+
+
+def holds(path: Path, policy: Policy) -> bool:
+    """Return whether a file can be read and is that of a policy with a snapshot, by its id and all its numbers."""
+    try:
+        arrays = _checked_arrays(path)
+        header = json_object(str(arrays.pop("header")), str(path))
+    except (PolicyFileError, KeyError, DocumentError):
+        return False
+    network = _network(policy)
+    same = arrays.keys() == network.keys() and all(np.array_equal(arrays[name], network[name]) for name in network)
+    return same and header.get("id") == policy.id
+
+
+def _network(policy: Policy) -> dict[str, Any]:
+    """Return the arrays of a policy file, but for the header."""
+    parameters, statistics = policy.snapshot.parameters["actor"]["params"], policy.snapshot.observation_statistics
     arrays = {
-        "header": np.array(json.dumps(header)),
         "log_std": parameters["log_std"],
         "observation_mean": statistics.mean,
         "observation_variance": statistics.variance,
     }
-    for index, layer in enumerate(layers):
+    for index in range(len(parameters["MLP_0"])):
+        layer = parameters["MLP_0"][f"Dense_{index}"]
         arrays |= {f"layer_{index}_kernel": layer["kernel"], f"layer_{index}_bias": layer["bias"]}
-    with written_whole(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, **arrays)
+    return arrays
 
 
 def policy_path(place: Path, policy_id: int | None = None) -> Path:
@@ -111,7 +158,8 @@ def policy_path(place: Path, policy_id: int | None = None) -> Path:
         if policy_id is not None:
             raise PolicyFileError(f"{place} is no run folder, so it has no policy {policy_id}")
         return place
-    path = place / ("chosen.npz" if policy_id is None else f"policies/{policy_id:05d}.npz")
+    layout = Layout(place)
+    path = layout.chosen if policy_id is None else layout.policy(policy_id)
     if not path.exists():
         what = "chosen policy; name one by its id" if policy_id is None else f"policy {policy_id}; see its policies/"
         raise PolicyFileError(f"{place} has no {what}")
@@ -120,20 +168,56 @@ def policy_path(place: Path, policy_id: int | None = None) -> Path:
 
 def load_policy(path: Path | str) -> StoredPolicy:
     """Read a policy. Raises PolicyFileError, naming the file, if it is not one that can be read, and NewerFormat."""
+    arrays = _checked_arrays(Path(path))
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(str(arrays["header"]))
-        check_format(header, FORMAT, header.get("jmorl"), str(path))
+        header = json_object(str(arrays["header"]), "its header")
+        check_format(header, FORMAT, str(path))
         header.setdefault("network", INPUT)  # files of the first versions do not say
+        if "spread" in header:  # as the first versions call it
+            header["std"] = header.pop("spread")
+        check_fields(header, _HEADER, "its header")
         count = sum(name.endswith("_kernel") for name in arrays)
         layers = tuple((arrays[f"layer_{i}_kernel"], arrays[f"layer_{i}_bias"]) for i in range(count))
-        return StoredPolicy(
+        policy = StoredPolicy(
             header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"]
         )
-    except NewerFormat:
-        raise
-    except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+        _check_use(policy)
+    except KeyError as error:
+        raise PolicyFileError(f"{path} is not a policy file: it has no {error}") from error
+    except (DocumentError, ValueError, TypeError, IndexError) as error:
+        if isinstance(error, NewerFormat):
+            raise
+        raise PolicyFileError(f"{path} is not a policy file: {error}") from error
+    return policy
+
+
+def _check_use(policy: StoredPolicy) -> None:
+    """Raise ValueError for a policy whose parts do not fit each other."""
+    actions = policy(np.zeros_like(policy.observation_mean))
+    if actions.ndim != 1 or actions.shape != policy.log_std.shape:
+        raise ValueError(f"its actions have shape {actions.shape}, not {policy.log_std.shape}")
+    objectives, values = len(policy.header["objectives"]), len(policy.header["values"])
+    if objectives != values:
+        raise ValueError(f"it has {values} values for {objectives} objectives")
+
+
+def _checked_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of a NumPy archive, every byte of them compared with its checksum first.
+
+    NumPy alone compares only what it reads to the end. Raises PolicyFileError.
+    """
+    try:
+        content = io.BytesIO(path.read_bytes())
+        with zipfile.ZipFile(content) as archive:
+            damaged = archive.testzip()
+        if damaged:
+            raise zipfile.BadZipFile(f"the bytes of {damaged} are not those that were written")
+        content.seek(0)
+        with np.load(content, allow_pickle=False) as arrays:
+            return dict(arrays)
+    except OSError as error:
+        raise PolicyFileError(f"{path} cannot be read: {error.strerror or error}") from error
+    except (ValueError, KeyError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise PolicyFileError(f"{path} is not a policy file: {error}") from error
 
 

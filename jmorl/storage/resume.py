@@ -11,7 +11,7 @@ from typing import Any
 import envs
 from envs.checks import check_environment
 from envs.core import Environment
-from jmorl.config import Config, ConfigError, resolve
+from jmorl.config import Config, ConfigError
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.decision.remembered import Remembered
@@ -22,24 +22,16 @@ from jmorl.learning.population import Population
 from jmorl.loop import make_method, run
 from jmorl.search.policy import Policy
 from jmorl.state import RunState
-from jmorl.storage.checkpoints import (
-    Checkpoint,
-    DamagedCheckpoint,
-    checkpoint_path,
-    read_checkpoint,
-    stored_generations,
-)
+from jmorl.storage.checkpoints import Checkpoint, stored_generations
 from jmorl.storage.decision_log import DecisionLog
-from jmorl.storage.files import remove_partial, write_json
+from jmorl.storage.files import remove, remove_partial, write_json, written_whole
+from jmorl.storage.layout import Layout, checkpoint_path
 from jmorl.storage.lock import FolderInUse, RunLock
-from jmorl.storage.manifest import Manifest, circumstances, differences, now, read_manifest
+from jmorl.storage.manifest import Manifest, circumstances, differences, now
+from jmorl.storage.policy_file import PolicyFileError, holds, load_policy
 from jmorl.storage.run_folder import RunFolder, check_free
-from jmorl.storage.serialization import PackingError, unpack
+from jmorl.storage.stored_state import CannotContinue, Found, last_good, read_start, state_after
 from jmorl.storage.versions import NewerFormat
-
-
-class CannotContinue(ValueError):
-    """There is no run in the folder that could go on from there; the message says why, and what to do."""
 
 
 class AlreadyFinished(CannotContinue):
@@ -80,14 +72,17 @@ def resume(path: Path, user: DecisionMaker | None = None) -> Continued:
     half-written is deleted. `user` takes the place of the config's, who then need not be there any more. Raises
     CannotContinue, FolderInUse, NewerFormat and NotAsDeclared, having changed nothing.
     """
-    manifest, config = _read_start(path)
-    if (path / "result.json").exists():
+    manifest, config = read_start(path)
+    ended = AlreadyFinished(f"the run in {path} has ended; there is nothing to resume")
+    if Layout(path).result.exists():
         _tidy(path)
-        raise AlreadyFinished(f"the run in {path} has ended; there is nothing to resume")
+        raise ended
     environment = _environment(config)
     user = user or _its_user(path, config, environment)
     with _locked(path) as lock:
-        found, notes = _last_good(path, manifest, config, environment)
+        if Layout(path).result.exists():  # since it was looked for
+            raise ended
+        found, notes = last_good(path, manifest, config, environment)
         if found is None and manifest.get("parent"):
             raise CannotContinue(
                 f"{path} has no checkpoint to go on from; branch off {manifest['parent']['name']} again"
@@ -108,12 +103,11 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
     before. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or has a script
     that cannot be read, ConfigError; nothing is made then.
     """
-    manifest, config = _read_start(path)
+    manifest, config = read_start(path)
     config = config.replace(user=user) if user else config
     environment = _environment(config)
     decision_maker = _new_user(config, environment)
-    checkpoint = _the_checkpoint(path, generation, manifest)
-    state = _unpacked(path, checkpoint, config, environment)
+    checkpoint, state = state_after(path, generation, manifest, config, environment)
     state = replace(state, search=make_method(config, environment).asking_at_once(state.search))
     parent = {"run": manifest["run"], "name": path.resolve().name, "generation": generation}
     check_free(out, force)
@@ -122,40 +116,14 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
     folder = RunFolder.create(out, config, environment, force, parent)
     try:
         _restore_logs(folder, checkpoint)
-        for file in (path / "policies").glob("*.npz"):
-            if file.stem.isdigit() and int(file.stem) < state.policies:
-                shutil.copyfile(file, folder.policy_path(int(file.stem)))
-        _restore_front(folder, state)
+        notes = _restore_policies(folder, Layout(path), state)
+        folder.write_front(state.archive.members)
         folder.checkpoints.save(state, folder.logs())
         folder.checkpoints.wait()
-        return Continued(folder, state, user=decision_maker)
+        return Continued(folder, state, tuple(notes), decision_maker)
     except BaseException:
         folder.close()
         raise
-
-
-def _read_start(path: Path) -> tuple[Manifest, Config]:
-    """What a run was started with."""
-    if not (path / "manifest.json").exists():
-        raise CannotContinue(f"{path} is not a run folder: it has no manifest.json")
-    if not (path / "config.toml").exists():
-        raise CannotContinue(f"the run in {path} ended before it began; start it again with `jmorl train`")
-    try:
-        manifest = read_manifest(path)
-        config = resolve(file=path / "config.toml")
-        run, started, version = manifest["run"], manifest["config"], manifest["packages"]["jmorl"]
-        if not config.is_identified_by(started):
-            raise CannotContinue(
-                f"{path / 'config.toml'} is not what run {run} was started with (by jmorl {version}: {started}, now: "
-                f"{config.identity()}); restore it, or start a run of its own with `jmorl train --config`"
-            )
-    except (CannotContinue, NewerFormat):
-        raise
-    except ConfigError as error:
-        raise CannotContinue(f"{path / 'config.toml'} cannot be used: {'; '.join(error.problems)}") from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise CannotContinue(f"{path} cannot be read as a run: {error}") from error
-    return manifest, config
 
 
 def _environment(config: Config) -> Environment[Any]:
@@ -166,7 +134,7 @@ def _environment(config: Config) -> Environment[Any]:
 
 def _its_user(path: Path, config: Config, environment: Environment[Any]) -> DecisionMaker:
     """Who decides in a run that has begun. A script that is gone is not missed where everything is answered."""
-    log = path / "decisions.jsonl"
+    log = Layout(path).decisions
     try:
         return make_user(config.user, environment.objectives)
     except ValueError as error:
@@ -222,78 +190,31 @@ def _locked(path: Path) -> Iterator[RunLock]:
 
 def _opened(path: Path, config: Config, environment: Environment[Any], lock: RunLock, manifest: Manifest) -> RunFolder:
     remove_partial(path)
-    (path / "policies").mkdir(exist_ok=True)
+    Layout(path).policy_files.mkdir(exist_ok=True)
     return RunFolder(path, config, environment, lock, manifest)
-
-
-Found = tuple[Checkpoint, RunState]
-
-
-def _last_good(
-    path: Path, manifest: Manifest, config: Config, environment: Environment[Any]
-) -> tuple[Found | None, list[str]]:
-    """The last checkpoint that is whole, and its state; None if there is none; and what is wrong with later ones."""
-    notes: list[str] = []
-    for generation in reversed(stored_generations(path / "checkpoints")):
-        try:
-            checkpoint = _own_checkpoint(path, generation, manifest)
-            return (checkpoint, _unpacked(path, checkpoint, config, environment)), notes
-        except DamagedCheckpoint as error:
-            notes.append(str(error))
-    return None, notes
-
-
-def _own_checkpoint(path: Path, generation: int, manifest: Manifest) -> Checkpoint:
-    """A checkpoint of the run in a folder. Raises DamagedCheckpoint, for one of another run, too."""
-    folder = path / "checkpoints"
-    checkpoint = read_checkpoint(folder, generation)
-    if checkpoint.run != manifest["run"]:
-        raise DamagedCheckpoint(f"{checkpoint_path(folder, generation)} belongs to another run")
-    return checkpoint
-
-
-def _unpacked(path: Path, checkpoint: Checkpoint, config: Config, environment: Environment[Any]) -> RunState:
-    """The state in a checkpoint. Raises CannotContinue if the run has no such states now."""
-    try:
-        return unpack(checkpoint.state, config, environment)
-    except PackingError as error:
-        place = checkpoint_path(path / "checkpoints", checkpoint.generation)
-        raise CannotContinue(f"{place} does not fit this jmorl: {error}") from error
-
-
-def _the_checkpoint(path: Path, generation: int, manifest: Manifest) -> Checkpoint:
-    """The checkpoint of a generation, for a branch."""
-    stored = stored_generations(path / "checkpoints")
-    if generation not in stored:
-        raise CannotContinue(
-            f"{path} has no checkpoint of generation {generation}, only of: {', '.join(map(str, stored)) or 'none'}"
-        )
-    try:
-        return _own_checkpoint(path, generation, manifest)
-    except DamagedCheckpoint as error:
-        raise CannotContinue(f"{error}; branch off another generation") from error
 
 
 def _restore(folder: RunFolder, found: Found | None, notes: list[str]) -> RunState | None:
     """Take the folder back to a checkpoint, or to the beginning."""
     checkpoint, state = found or (None, None)
-    later = [each for each in stored_generations(folder.path / "checkpoints") if not state or each > state.generation]
+    layout = folder.layout
+    later = [each for each in stored_generations(layout.checkpoints) if not state or each > state.generation]
     if later:
         notes.append(f"the run goes on from {f'generation {state.generation}' if state else 'the beginning'} instead")
     _restore_logs(folder, checkpoint)
     if folder.decisions.restored:
         notes.append(f"{folder.decisions.path} was not as the checkpoint knows it, and is restored from there")
-    known = state.policies if state else 0
-    for file in (folder.path / "policies").glob("*.npz"):
-        if re.fullmatch(r"\d+", file.stem) and int(file.stem) >= known:
+    for number, file in _policy_files(layout).items():
+        if not state or number >= state.policies:
             file.unlink()
     if state:
-        _restore_front(folder, state)
+        notes += _restore_policies(folder, layout, state)
+        folder.write_front(state.archive.members)
     else:
-        (folder.path / "front.csv").unlink(missing_ok=True)
-    (folder.path / "chosen.npz").unlink(missing_ok=True)
+        layout.front.unlink(missing_ok=True)
+    layout.chosen.unlink(missing_ok=True)
     for generation in later:
-        shutil.rmtree(checkpoint_path(folder.path / "checkpoints", generation))
+        remove(checkpoint_path(layout.checkpoints, generation))
     return state
 
 
@@ -305,11 +226,50 @@ def _restore_logs(folder: RunFolder, checkpoint: Checkpoint | None) -> None:
     folder.decisions = DecisionLog(path, logs.get(path.name, ""))
 
 
-def _restore_front(folder: RunFolder, state: RunState) -> None:
-    """front.csv, and the files of its policies that are not there."""
+def _restore_policies(folder: RunFolder, source: Layout, state: RunState) -> list[str]:
+    """Give the folder the policies that a state had, from the files of `source`, which may be the folder's own.
+
+    A file that is damaged is written again from the state, and so is one of the front that is not there. Returns what
+    somebody should know of the damaged ones.
+    """
+    notes = []
+    known = {policy.id: policy for policy in _with_snapshots(folder, state)}
+    for number, file in _policy_files(source).items():
+        if number >= state.policies:
+            continue
+        if _is_sound(file, number, known.get(number)):
+            if source != folder.layout:
+                with written_whole(folder.layout.policy(number)) as temporary:
+                    shutil.copyfile(file, temporary)
+        elif number in known:
+            folder.save_policies([known[number]])
+            notes.append(f"{file} was damaged, and is written again from the checkpoint")
+        else:
+            notes.append(f"{file} is damaged, and the checkpoint does not have this policy any more")
     members: tuple[Policy, ...] = state.archive.members
-    folder.save_policies([policy for policy in members if not folder.policy_path(policy.id).exists()])
-    folder.write_front(members)
+    folder.save_policies([policy for policy in members if not folder.layout.policy(policy.id).exists()])
+    return notes
+
+
+def _with_snapshots(folder: RunFolder, state: RunState) -> tuple[Policy, ...]:
+    choice = (state.choice,) if state.choice else ()
+    return (*state.archive.members, *folder.method.pack(state.search).policies, *choice)
+
+
+def _policy_files(layout: Layout) -> dict[int, Path]:
+    """Return the files of a run's policies, by id."""
+    numbers = sorted(int(file.stem) for file in layout.policy_files.glob("*.npz") if re.fullmatch("[0-9]+", file.stem))
+    return {number: layout.policy(number) for number in numbers}
+
+
+def _is_sound(file: Path, number: int, policy: Policy | None) -> bool:
+    """Return whether a file has all the numbers of its policy, or if they are not known, whether it can be read."""
+    if policy:
+        return holds(file, policy)
+    try:
+        return bool(load_policy(file).header["id"] == number)
+    except (PolicyFileError, NewerFormat):
+        return False
 
 
 def _note_resumption(folder: RunFolder, state: RunState | None, notes: list[str]) -> None:
@@ -323,4 +283,4 @@ def _note_resumption(folder: RunFolder, state: RunState | None, notes: list[str]
         )
     resumption = {"at": now(), "after_generation": state.generation if state else None, **here}
     folder.manifest = {**folder.manifest, "resumed": [*folder.manifest["resumed"], resumption]}
-    write_json(folder.path / "manifest.json", folder.manifest)
+    write_json(folder.layout.manifest, folder.manifest)

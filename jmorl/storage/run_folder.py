@@ -16,12 +16,9 @@ run.lock         while a process writes the folder
 Nothing in it names a place outside it, so it may be moved.
 """
 
-import csv
-import io
 import itertools
-import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -30,7 +27,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from envs.checks import check_environment
+import envs
+from envs.checks import check_environment, check_same
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.display.commands import command
@@ -38,15 +36,15 @@ from jmorl.events import Decided, Event, GenerationFinished, RunFinished
 from jmorl.loop import make_method
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
+from jmorl.storage.csv_log import CsvLog, Row, csv_text
 from jmorl.storage.decision_log import DecisionLog
-from jmorl.storage.files import append_text, write_json, write_text, written_whole
-from jmorl.storage.lock import LOCK_FILE, FolderInUse, RunLock, check_unlocked
+from jmorl.storage.files import partial_path, remove, write_json, write_text
+from jmorl.storage.layout import Layout
+from jmorl.storage.lock import FolderInUse, RunLock, check_unlocked
 from jmorl.storage.manifest import Manifest, new_manifest, now
 from jmorl.storage.policy_file import save_policy
 
 RUNS = Path("runs")  # where runs are that were not given a folder
-
-Row = Mapping[str, Any]
 
 
 class RunFolder:
@@ -57,15 +55,17 @@ class RunFolder:
 
     def __init__(self, path: Path, config: Config, environment: Environment[Any], lock: RunLock, manifest: Manifest):
         self.path = path
+        self.layout = Layout(path)
         self.config = config
         self.environment = environment
         self.lock = lock
         self.manifest = manifest
-        self.metrics = CsvLog(path / "metrics.csv")
-        self.policies = CsvLog(path / "policies.csv")
-        self.decisions = DecisionLog(path / "decisions.jsonl")
+        self.metrics = CsvLog(self.layout.metrics)
+        self.policies = CsvLog(self.layout.policies)
+        self.decisions = DecisionLog(self.layout.decisions)
+        self.method = make_method(config, environment)
         self.checkpoints = CheckpointWriter(
-            path / "checkpoints", manifest["run"], config.checkpoints.keep, make_method(config, environment)
+            self.layout.checkpoints, manifest["run"], config.checkpoints.keep, self.method
         )
 
     @classmethod
@@ -77,26 +77,29 @@ class RunFolder:
         force: bool = False,
         parent: Manifest | None = None,
     ) -> "RunFolder":
-        """Make the folder, with config and manifest. Raises FolderInUse as `check_free` does, or if it cannot be made.
+        """Make the folder, with config and manifest. Of several processes that do so at once, one succeeds.
 
         Without a path it is a new one in `runs`, named after the time.
-        `parent` is as in `new_manifest`. Raises NotAsDeclared, having changed nothing, for an environment that is not
-        what it says.
+        `parent` is as in `new_manifest`. Raises FolderInUse as `check_free` does, or if the folder cannot be made, and
+        NotAsDeclared for an environment that is not what it says, or not what `config` names; nothing is changed then.
         """
         if path:
             check_free(path, force)
         check_environment(environment)
+        check_same(environment, envs.make(config.env), config.env)
         try:
             path = _made(path)
+            layout = Layout(path)
             lock = RunLock(path)
         except OSError as error:
             raise FolderInUse(f"{path or RUNS} cannot be written: {error.strerror}") from error
         try:
-            _empty(path)
+            _check_contents(layout, force)  # another process may have had the lock since it was looked at
+            _empty(layout)
             manifest = new_manifest(config, parent)
-            write_json(path / "manifest.json", manifest)
-            write_text(path / "config.toml", config.to_toml())
-            (path / "policies").mkdir()
+            write_json(layout.manifest, manifest)
+            write_text(layout.config, config.to_toml())
+            layout.policy_files.mkdir()
             return cls(path, config, environment, lock, manifest)
         except BaseException:
             lock.release()
@@ -131,18 +134,15 @@ class RunFolder:
             case RunFinished():
                 self._record_result(event)
 
-    def policy_path(self, policy_id: int) -> Path:
-        """Where the file of an archived policy is."""
-        return self.path / "policies" / f"{policy_id:05d}.npz"
-
     def save_policies(self, policies: Sequence[Policy]) -> None:
         """Write a file for each."""
         for policy in policies:
-            save_policy(self.policy_path(policy.id), policy, self.environment, self.config, self.manifest["run"])
+            self._save_policy(self.layout.policy(policy.id), policy)
 
     def write_front(self, front: Sequence[Policy]) -> None:
         """Write or replace front.csv."""
-        write_text(self.path / "front.csv", _csv([self._policy_row(policy) for policy in front], header=True))
+        rows = [self._policy_row(policy) for policy in front]
+        write_text(self.layout.front, csv_text(rows, list(rows[0])))
 
     def logs(self) -> dict[str, str]:
         """What a checkpoint keeps of the logs."""
@@ -159,10 +159,12 @@ class RunFolder:
 
     def _record_result(self, event: RunFinished) -> None:
         self.checkpoints.wait()
-        with written_whole(self.path / "chosen.npz") as temporary:
-            shutil.copyfile(self.policy_path(event.chosen.id), temporary)
+        self._save_policy(self.layout.chosen, event.chosen)
         result = {"reason": event.reason, "finished": now(), "chosen": self._policy_row(event.chosen)}
-        write_json(self.path / "result.json", result)
+        write_json(self.layout.result, result)
+
+    def _save_policy(self, path: Path, policy: Policy) -> None:
+        save_policy(path, policy, self.environment, self.config, self.manifest["run"])
 
     def _metrics_row(self, event: GenerationFinished) -> Row:
         state = event.state
@@ -206,28 +208,6 @@ class RunFolder:
         }
 
 
-class CsvLog:
-    """A CSV file that only grows, and its text."""
-
-    def __init__(self, path: Path):
-        self.path = path
-        self.text = ""
-
-    def append(self, rows: Sequence[Row]) -> None:
-        """Add rows, at least one, after a header line if they are the first."""
-        added = _csv(rows, header=not self.text)
-        append_text(self.path, added)
-        self.text += added
-
-    def restore(self, text: str) -> None:
-        """Take the file back to what it was."""
-        self.text = text
-        if text:
-            write_text(self.path, text)
-        else:
-            self.path.unlink(missing_ok=True)
-
-
 def _made(path: Path | None) -> Path:
     """Make the folder, or without a path the next that is free: runs that begin in the same second get one each."""
     if path:
@@ -249,44 +229,58 @@ def check_free(path: Path, force: bool) -> None:
     """
     if path.exists() and not path.is_dir():
         raise FolderInUse(f"{path} is a file; a run needs a folder of its own")
-    if not path.exists() or all(_is_leftover(each) for each in path.iterdir()):
+    layout = Layout(path)
+    if _has_run(layout):
+        check_unlocked(path)
+    _check_contents(layout, force)
+
+
+def _check_contents(layout: Layout, force: bool) -> None:
+    """Raise FolderInUse if what is in the folder, or what is not, must not be overwritten."""
+    path = layout.root
+    if not path.exists() or all(each in _leftovers(layout) for each in path.iterdir()):
         return
-    if not (path / "manifest.json").exists():
+    if not _has_run(layout):
         raise FolderInUse(f"{path} is not empty, and not a run; choose another folder")
-    check_unlocked(path)
-    if not force and not (path / "result.json").exists():
+    if force:
+        return
+    if not layout.config.exists():
+        raise FolderInUse(
+            f"{path} holds what is left of a run, without its {layout.config.name}; put that back and continue the run "
+            f"with `jmorl resume {path}`, choose another folder, or overwrite it with --force"
+        )
+    if not layout.result.exists():
         raise FolderInUse(
             f"{path} holds a run that has not ended; continue it with `{command('resume', path)}`, choose another "
             "folder, or overwrite it with --force"
         )
-    if not force:
-        raise FolderInUse(f"{path} already holds a run; choose another folder, or overwrite it with --force")
+    raise FolderInUse(f"{path} already holds a run; choose another folder, or overwrite it with --force")
 
 
-def _empty(path: Path) -> None:
+def _has_run(layout: Layout) -> bool:
+    return layout.manifest.exists()
+
+
+def has_begun(layout: Layout) -> bool:
+    """Return whether a folder with a manifest has more of a run than a process leaves that is killed in making it."""
+    return not all(each in _leftovers(layout) for each in layout.root.iterdir())
+
+
+def _empty(layout: Layout) -> None:
     """Delete a run but for its manifest: what an interruption leaves then still counts as a run, an unfinished one."""
-    (path / "result.json").unlink(missing_ok=True)
-    for each in path.iterdir():
-        if each.is_dir():
-            shutil.rmtree(each)
-        elif each.name not in (LOCK_FILE, "manifest.json"):
-            each.unlink()
+    layout.result.unlink(missing_ok=True)
+    kept = (layout.lock, layout.manifest, layout.config)
+    for each in layout.root.iterdir():
+        if each not in kept:
+            remove(each)
+    layout.config.unlink(missing_ok=True)  # the last one: without it the run has not begun
 
 
 def folder_bytes(path: Path) -> int:
-    """What a folder has on the disk."""
+    """Return what a folder has on the disk."""
     return sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
 
 
-def _is_leftover(path: Path) -> bool:
-    """Whether a process that ended before the folder was a run has left this."""
-    return path.name in (LOCK_FILE, ".manifest.json.partial")
-
-
-def _csv(rows: Sequence[Row], header: bool) -> str:
-    file = io.StringIO(newline="")
-    writer = csv.DictWriter(file, rows[0].keys())
-    if header:
-        writer.writeheader()
-    writer.writerows(rows)
-    return file.getvalue()
+def _leftovers(layout: Layout) -> tuple[Path, ...]:
+    """Return what a process may leave that ended before the folder was a run. A run has begun with its config."""
+    return layout.lock, layout.manifest, partial_path(layout.manifest), partial_path(layout.config)

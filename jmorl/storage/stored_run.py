@@ -1,26 +1,46 @@
 """Reading a run folder back: what tables, plots and later decisions are made from."""
 
-import csv
-import json
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 import envs
 from envs.core import Objective
 from jmorl.config import Config, ConfigError, resolve
-from jmorl.decision.records import Record, ScriptError, read_log
+from jmorl.decision.records import DecisionRecord, Record, ScriptError, read_log
 from jmorl.search.policy import Policy
-from jmorl.storage.manifest import read_manifest
+from jmorl.storage.csv_log import read_rows
+from jmorl.storage.documents import check_fields, json_object
+from jmorl.storage.layout import Layout
+from jmorl.storage.manifest import check_config, read_manifest
 from jmorl.storage.versions import NewerFormat
 from jmorl.units import measured_in
 
 
 class StoredRunError(ValueError):
     """A folder that is no run, or one that cannot be read."""
+
+
+class _Chosen(TypedDict):
+    policy: int
+
+
+class _Result(TypedDict):
+    """What is relied on of a result; there is more."""
+
+    reason: Literal["budget", "satisfied", "stopped"]
+    chosen: _Chosen
+
+
+_RESULT = TypeAdapter(_Result)
+NUMBERS = ("steps", "evaluation_steps", "select_seconds", "train_seconds", "evaluate_seconds")  # no run is without
 
 
 @dataclass(frozen=True)
@@ -50,65 +70,126 @@ class StoredRun:
 
 
 def read_run(path: Path) -> StoredRun:
-    """Read a run folder. Raises StoredRunError, naming the file, if there is none or it cannot be read; and
-    NewerFormat.
-    """
-    try:
+    """Read a run folder. Raises NewerFormat, and StoredRunError, naming the file, for none or a damaged one."""
+    layout = Layout(path)
+    if not layout.manifest.exists() or not layout.metrics.exists():
+        raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up")
+    with _reading(path):
         manifest = read_manifest(path)
-        config = resolve(file=path / "config.toml")
+        config = resolve(file=layout.config)
+        check_config(path, manifest, config)
         objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
-        policies = tuple(_policy(row, objectives) for row in _rows(path / "policies.csv"))
-        result = path / "result.json"
-        log = path / "decisions.jsonl"
-        return StoredRun(
-            path,
-            config,
-            manifest,
-            objectives,
-            _columns(_rows(path / "metrics.csv")),
-            policies,
-            tuple(policies[int(row["policy"])] for row in _rows(path / "front.csv")),
-            tuple(read_log(log)) if log.exists() else (),
-            json.loads(result.read_text(encoding="utf-8")) if result.exists() else None,
-        )
+        decisions = tuple(read_log(layout.decisions)) if layout.decisions.exists() else ()
+        result = _result(layout.result) if layout.result.exists() else None
+    with _reading(layout.metrics):
+        metrics = _metrics(read_rows(layout.metrics))
+    with _reading(layout.policies):
+        policies = _policies(read_rows(layout.policies), objectives)
+    with _reading(layout.front):
+        by_id = {policy.id: policy for policy in policies}
+        front = tuple(by_id[_whole_number(row["policy"])] for row in read_rows(layout.front))
+    generations = len(metrics["generation"])
+    decisions = tuple(record for record in decisions if record.generation <= generations)
+    run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result)
+    _check_together(run)
+    return run
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turn what goes wrong in reading a file, or a folder, into StoredRunError that names it."""
+    try:
+        yield
     except NewerFormat:
         raise
-    except FileNotFoundError as error:
-        raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up: {error}") from error
-    except (OSError, KeyError, IndexError, TypeError, ValueError, ConfigError, ScriptError) as error:
-        raise StoredRunError(f"{path} cannot be read as a run: {error}") from error
+    except KeyError as error:
+        raise StoredRunError(f"{path} cannot be read: it has no {error}") from error
+    except OSError as error:
+        raise StoredRunError(f"{error.filename or path} cannot be read: {error.strerror}") from error
+    except ConfigError as error:
+        raise StoredRunError(f"{Layout(path).config} cannot be used: {'; '.join(error.problems)}") from error
+    except (ValueError, TypeError, IndexError, ScriptError) as error:
+        named = str(path) in str(error)
+        raise StoredRunError(str(error) if named else f"{path} cannot be read: {error}") from error
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    for number, row in enumerate(rows, start=2):
-        if None in row.values():
-            raise ValueError(f"{path}, line {number} ends too early")
-    return rows
+def _result(path: Path) -> Mapping[str, Any]:
+    result = json_object(path.read_bytes(), str(path))
+    check_fields(result, _RESULT, str(path))
+    return result
 
 
-def _columns(rows: list[dict[str, str]]) -> dict[str, np.ndarray]:
-    return {name: np.array([_number(row[name]) for row in rows]) for name in rows[0]}
+def _metrics(rows: list[dict[str, str]]) -> Mapping[str, np.ndarray]:
+    """Return the columns [G + 1]; one that the version of the run did not write is NaN."""
+    columns = {name: np.array([_number(row[name]) for row in rows]) for name in (rows[0] if rows else ())}
+    if not np.array_equal(columns.get("generation", np.array([])), np.arange(max(len(rows), 1))):
+        raise ValueError("its generations are not 0, 1, 2 and so on")
+    if not all(np.isfinite(columns[name]).all() for name in NUMBERS):
+        raise ValueError(f"numbers are missing from one of the columns {', '.join(NUMBERS)}")
+    return defaultdict(lambda: np.full(len(rows), np.nan), columns)
+
+
+def _policies(rows: list[dict[str, str]], objectives: tuple[Objective, ...]) -> tuple[Policy, ...]:
+    policies = tuple(_policy(row, objectives) for row in rows)
+    if not policies or [policy.id for policy in policies] != list(range(len(policies))):
+        raise ValueError("its policies are not 0, 1, 2 and so on")
+    return policies
+
+
+def _check_together(run: StoredRun) -> None:
+    """Raise StoredRunError if a file speaks of what another does not have."""
+    layout = Layout(run.path)
+    known, generations, objectives = len(run.policies), len(run.metrics["generation"]), len(run.objectives)
+    if not run.front:
+        raise StoredRunError(f"{layout.front} has no policy")
+    # A run that was killed may have noted the policies of a generation, but not yet the generation.
+    if max(policy.generation for policy in run.policies) > generations - bool(run.result):
+        raise StoredRunError(f"{layout.metrics} ends before {layout.policies}")
+    if run.result and not 0 <= run.result["chosen"]["policy"] < known:
+        raise StoredRunError(f"{layout.result} names a policy that {layout.policies} does not have")
+    for record in run.decisions:
+        values = [shown.values for shown in record.shown]
+        if isinstance(record, DecisionRecord):
+            values.append(record.values)
+            if not 0 <= record.policy < known:
+                raise StoredRunError(f"{layout.decisions} names a policy that {layout.policies} does not have")
+        if any(len(each) != objectives for each in values):
+            raise StoredRunError(f"{layout.decisions} has values that are not one for each of {objectives} objectives")
 
 
 def _number(cell: str) -> float:
-    return float(cell) if cell else np.nan
+    """Return the number of a cell; NaN for an empty one, and for infinity, of which nothing can be drawn."""
+    number = float(cell) if cell else np.nan
+    return number if np.isfinite(number) else np.nan
+
+
+def _whole_number(cell: str) -> int:
+    if not cell.isdecimal():
+        raise ValueError(f"{cell!r} is not a whole number")
+    return int(cell)
 
 
 def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy:
+    """Return the policy of a row; what the version of the run did not write is NaN, or None."""
+
+    def needed(prefix: str) -> np.ndarray:
+        vector = np.array([float(row[f"{prefix}_{objective.name}"]) for objective in objectives])
+        if not np.isfinite(vector).all():
+            raise ValueError(f"the {prefix} of policy {row['policy']} is not finite")
+        return vector
+
     def vector(prefix: str) -> np.ndarray:
-        return np.array([_number(row[f"{prefix}_{objective.name}"]) for objective in objectives])
+        return np.array([_number(row.get(f"{prefix}_{objective.name}", "")) for objective in objectives])
 
     def vector_or_none(prefix: str) -> np.ndarray | None:
         return None if np.isnan(vector(prefix)).any() else vector(prefix)
 
     return Policy(
-        id=int(row["policy"]),
-        generation=int(row["generation"]),
-        parent=int(row["parent"]) if row["parent"] else None,
-        weights=vector("weight"),
-        values=vector("value"),
+        id=_whole_number(row["policy"]),
+        generation=_whole_number(row["generation"]),
+        parent=_whole_number(row["parent"]) if row["parent"] else None,
+        weights=needed("weight"),
+        values=needed("value"),
         std=vector("std"),
         discounted=vector("discounted"),
         snapshot=None,

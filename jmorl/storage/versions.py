@@ -4,16 +4,28 @@ import importlib.metadata
 from collections.abc import Mapping
 from typing import Any
 
+from jmorl.storage.documents import DocumentError
+
 
 class NewerFormat(ValueError):
     """A file is in a format that this jmorl does not know yet."""
 
 
-def check_format(fields: Mapping[str, Any], known: int, writer: str | None, name: str) -> None:
-    """Raise NewerFormat if `fields["format"]` is above the one known; `writer` is the version that wrote it."""
-    if fields["format"] > known:
+def check_format(fields: Mapping[str, Any], known: int, name: str) -> None:
+    """Raise NewerFormat if `fields["format"]` is above the one known, DocumentError if it is none."""
+    found = fields.get("format")
+    if type(found) is not int or found < 1:
+        raise DocumentError(f"{name} is damaged: its format is {found!r}, not a number from 1 to {known}")
+    if found > known:
         here = importlib.metadata.version("jmorl")
         raise NewerFormat(
-            f"{name} has format {fields['format']}, written by jmorl {writer or 'of an unknown version'}; this is "
+            f"{name} has format {found}, written by jmorl {_writer(fields)}; this is "
             f"jmorl {here}, which knows formats up to {known}: update it"
         )
+
+
+def _writer(fields: Mapping[str, Any]) -> str:
+    """Return the version that wrote a document; a manifest has it among the packages."""
+    packages = fields.get("packages")
+    version = packages.get("jmorl") if isinstance(packages, Mapping) else fields.get("jmorl")
+    return str(version or "of an unknown version")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.storage.checkpoints import stored_generations
+from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import Manifest, read_manifest
 
 
@@ -64,14 +65,14 @@ def _branch(path: Path, manifest: Manifest, depth: int) -> Branch:
         leaves_after,
         depth,
         tuple(record for record in _decisions(path) if record.generation > leaves_after),
-        tuple(stored_generations(path / "checkpoints")),
-        (path / "result.json").exists(),
+        tuple(stored_generations(Layout(path).checkpoints)),
+        Layout(path).result.exists(),
     )
 
 
 def _decisions(path: Path) -> list[DecisionRecord]:
     try:
-        records = read_log(path / "decisions.jsonl") if (path / "decisions.jsonl").exists() else []
+        records = read_log(Layout(path).decisions) if Layout(path).decisions.exists() else []
     except ScriptError:  # a line is being written
         return []
     return [record for record in records if isinstance(record, DecisionRecord)]
@@ -80,7 +81,7 @@ def _decisions(path: Path) -> list[DecisionRecord]:
 def _manifest(path: Path) -> Manifest | None:
     """Read the manifest of a run; None for a folder without a readable one."""
     try:
-        manifest = read_manifest(path) if (path / "config.toml").exists() else {}
+        manifest = read_manifest(path) if Layout(path).config.exists() else {}
     except (OSError, ValueError, KeyError):
         return None
     return manifest if "run" in manifest else None

@@ -22,6 +22,7 @@ from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
 from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
+from jmorl.storage.layout import Layout
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
@@ -149,7 +150,7 @@ class Session:
     def policy_file(self, run: str, policy: int) -> Path | None:
         """Return the file of an archived policy of a run in the history; None if there is none."""
         member = next((each for each in self.history() if each.run == run), None)
-        path = member.path / "policies" / f"{policy:05d}.npz" if member else None
+        path = Layout(member.path).policy(policy) if member else None
         return path if path and path.is_file() else None
 
     def leave(self) -> None:
@@ -192,7 +193,7 @@ class Session:
                         break
             if self.view.result:
                 self.look_at(self.view.result.id)
-                draw_run(read_run(self.view.path), self.view.path / "plots")
+                draw_run(read_run(self.view.path), Layout(self.view.path).plots)
         except LeftOff:
             pass
         except Exception as error:  # whatever it is, the page says it, and what the run had is kept

@@ -19,6 +19,7 @@ from jmorl.report.timeline import Timeline
 from jmorl.search.archive import Archive
 from jmorl.search.policy import Policy, values_of
 from jmorl.state import RunState
+from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import read_manifest
 from jmorl.storage.stored_run import StoredRun, read_run
 from jmorl.units import measured_in
@@ -74,11 +75,11 @@ class View:
 
 
 def stored_view(path: Path) -> View:
-    """Read the view of a run folder; a run in its warm-up has nothing to show yet. Raises as `read_run` does."""
-    manifest, config = read_manifest(path), resolve(file=path / "config.toml")
+    """What a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
+    manifest, config = read_manifest(path), resolve(file=Layout(path).config)
     objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
     nothing = View(path, manifest["run"], config, objectives, (), (), np.full(len(objectives), -np.inf), None, (), None)
-    if not (path / "metrics.csv").exists():
+    if not Layout(path).metrics.exists():
         return nothing
     stored = read_run(path)
     decisions = [record for record in stored.decisions if isinstance(record, DecisionRecord)]

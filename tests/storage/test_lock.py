@@ -4,9 +4,11 @@ import os
 import subprocess
 import sys
 
+import filelock
 import pytest
 
-from jmorl.storage.lock import LOCK_FILE, FolderInUse, RunLock, check_unlocked
+from jmorl.storage.layout import Layout
+from jmorl.storage.lock import FolderInUse, RunLock, check_unlocked
 
 HOLD = """
 import sys
@@ -59,25 +61,46 @@ def test_a_released_lock_leaves_nothing_behind(tmp_path):
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"pid": 1}'])
 def test_a_lock_file_that_says_nothing_is_no_obstacle(tmp_path, content):
-    (tmp_path / LOCK_FILE).write_text(content)
+    Layout(tmp_path).lock.write_text(content)
     check_unlocked(tmp_path)
     assert RunLock(tmp_path).previous is None
 
 
+def test_who_only_looks_at_a_lock_keeps_nobody_out(tmp_path, monkeypatch):
+    """Looking takes the lock for a moment. Here it is found taken three times, and then no longer."""
+    lock_descriptor, calls = filelock.lock_descriptor, []
+
+    def taken_at_first(descriptor, blocking):
+        calls.append(descriptor)
+        return len(calls) > 3 and lock_descriptor(descriptor, blocking=blocking)
+
+    monkeypatch.setattr(filelock, "lock_descriptor", taken_at_first)
+    assert RunLock(tmp_path).previous is None
+    assert len(calls) == 4
+
+
+def test_looking_leaves_the_folder_free_and_the_file_as_it_was(tmp_path):
+    path = Layout(tmp_path).lock
+    path.write_text('{"pid": 17, "host": "here", "started": "yesterday"}')
+    before = path.read_bytes()
+    check_unlocked(tmp_path)
+    assert path.read_bytes() == before
+    assert RunLock(tmp_path).previous == "process 17 on here, started yesterday"
+
+
 def test_a_lock_file_deleted_between_opening_and_locking_is_not_taken_for_the_lock(tmp_path, monkeypatch):
     """Whoever locks the deleted file would share the folder with whoever makes a new one."""
-    import fcntl
+    lock_descriptor, calls = filelock.lock_descriptor, []
 
-    flock, calls = fcntl.flock, []
-
-    def late(descriptor, kind):
-        calls.append(kind)
+    def late(descriptor, blocking):
+        calls.append(descriptor)
         if len(calls) == 1:
-            (tmp_path / LOCK_FILE).unlink()
-        flock(descriptor, kind)
+            Layout(tmp_path).lock.unlink()
+        return lock_descriptor(descriptor, blocking=blocking)
 
-    monkeypatch.setattr(fcntl, "flock", late)
-    RunLock(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(filelock, "lock_descriptor", late)
+        RunLock(tmp_path)
     assert len(calls) == 2
     with pytest.raises(FolderInUse):
         RunLock(tmp_path)

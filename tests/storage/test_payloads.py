@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from jmorl.storage.checkpoints import (
-    DOCUMENT,
     Checkpoint,
     DamagedCheckpoint,
-    checkpoint_path,
     read_checkpoint,
     write_checkpoint,
 )
+from jmorl.storage.layout import CheckpointLayout, checkpoint_path
 from jmorl.storage.policy_file import PolicyFileError, load_policy
 from jmorl.storage.serialization import pack
 from tests.stored import stored_linear_policy
@@ -70,14 +69,14 @@ def test_a_checkpoint_with_a_pickle_for_any_of_its_files_is_refused(trace, check
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_checkpoint_whose_digests_were_forged_as_well_executes_nothing(trace, checkpoint, tmp_path):
     """Orbax passes over some files, and fails in its own words over others."""
-    document, refused = checkpoint / DOCUMENT, 0
+    document, refused = CheckpointLayout(checkpoint).document, 0
     honest = document.read_text()
     for path, payload in with_payloads(checkpoint, trace):
         if path != document:
             document.write_text(signed(honest, path.relative_to(checkpoint).as_posix(), payload))
             try:
                 read_checkpoint(tmp_path, 1)
-            except Exception:
+            except DamagedCheckpoint:
                 refused += 1
             document.write_text(honest)
     gc.collect()
