@@ -17,8 +17,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 import envs
 from jmorl.decision.users import parse_user
+from jmorl.search.pareto import MOST_OBJECTIVES
 
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, lt=2**31)]  # as large as JAX takes
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -137,8 +138,10 @@ class SearchConfig(Section):
         "range", description="search in values scaled by the archive's range, or in values less the reference point"
     )
     sparsity_weight: NonNegative = Field(1.0, description="alpha, cost of a sparse front against its hypervolume")
-    weight_divisions: Count = Field(10, description="steps on each edge of the grid of candidate weights")
-    buffer_bins: Count = Field(100, description="directions of the performance buffer")
+    weight_divisions: Count = Field(
+        10, description="steps on each edge of the grid of candidate weights; fewer where it would have over 100"
+    )
+    buffer_bins: Annotated[int, Field(ge=1, le=10_000)] = Field(100, description="directions of the performance buffer")
     buffer_size: Count = Field(4, description="policies kept in each direction")
 
 
@@ -165,7 +168,9 @@ class Config(Section):
     evaluation: EvaluationConfig = EvaluationConfig()
     search: SearchConfig = SearchConfig()
     checkpoints: CheckpointConfig = CheckpointConfig()
-    steps: Count = Field(2_500_000, description="budget of environment steps used for learning")
+    steps: Annotated[int, Field(ge=1, lt=2**63)] = Field(
+        2_500_000, description="budget of environment steps used for learning"
+    )
     reference_point: tuple[Finite, ...] = Field(
         (), description="of the reported hypervolume; empty: a tenth of the range below the first policies"
     )
@@ -173,7 +178,9 @@ class Config(Section):
     @field_validator("env")
     @classmethod
     def _known_environment(cls, env: str) -> str:
-        envs.make(env)
+        objectives = len(envs.make(env).objectives)
+        if objectives > MOST_OBJECTIVES:
+            raise ValueError(f"{env!r} has {objectives} objectives; a run can have {MOST_OBJECTIVES} at most")
         return env
 
     @field_validator("user")

@@ -16,7 +16,7 @@ from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Records, predict
 from jmorl.search.scaling import Scale, search_scale
-from jmorl.search.weights import simplex_grid
+from jmorl.search.weights import candidate_grid
 from jmorl.units import RunningUnits
 
 
@@ -83,7 +83,7 @@ def predictions(config: Config, state: RunState, of: Sequence[Policy]) -> np.nda
 
 def candidate_weights(config: Config, objectives: int) -> np.ndarray:
     """The weights [W, M] that a policy may be trained with after the warm-up."""
-    return simplex_grid(objectives, config.search.weight_divisions)
+    return candidate_grid(objectives, config.search.weight_divisions)
 
 
 def scale_of_gains(config: Config, state: RunState) -> Scale:

@@ -14,7 +14,7 @@ MAY_IMPORT = {
     "jmorl.search": set(),
     "jmorl.display": {"envs", "jmorl.search"},
     "jmorl.decision": {"envs", "jmorl.display", "jmorl.search"},
-    "jmorl.config": {"envs", "jmorl.decision"},
+    "jmorl.config": {"envs", "jmorl.decision", "jmorl.search"},
     "jmorl.signals": set(),
     "jmorl.units": {"envs"},
     "jmorl.arguments": {"jmorl.config"},
