@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 BROWSER := $(VENV)/.browser
 
 .PHONY: demo studio test test-slow test-studio screenshots check format bench bench-demo bench-physics bench-checkpoints \
-	bench-studio quality paper clean
+	bench-selection bench-studio quality paper clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
@@ -46,6 +46,9 @@ bench-demo: $(INSTALLED)  ## what a new user of the demo waits for, with nothing
 
 bench-checkpoints: $(INSTALLED)  ## what checkpoints cost, as a share of a generation
 	$(BIN)/python -m benchmarks.checkpoints
+
+bench-selection: $(INSTALLED)  ## how long the search thinks about a generation, by the number of objectives
+	$(BIN)/python -m benchmarks.selection
 
 bench-studio: $(BROWSER)  ## how fast the studio answers, and what it costs the training
 	$(BIN)/python -m benchmarks.studio

@@ -22,7 +22,7 @@ from jmorl.decision.users import parse_user
 from jmorl.learning.settings import EvaluationConfig, LearningConfig, PPOConfig
 from jmorl.methods import registry
 from jmorl.presets import PRESETS
-from jmorl.search.settings import SearchConfig
+from jmorl.search.settings import MOST_OBJECTIVES, SearchConfig
 from jmorl.search.weights import evenly_spaced_weights
 from jmorl.settings import Count, Finite, NonNegative, Section
 
@@ -73,7 +73,9 @@ class Config(Section):
     evaluation: EvaluationConfig = EvaluationConfig()
     search: SearchConfig = SearchConfig()
     checkpoints: CheckpointConfig = CheckpointConfig()
-    steps: Annotated[int, Field(ge=1)] = Field(2_500_000, description="budget of environment steps used for learning")
+    steps: Annotated[int, Field(ge=1, lt=2**63)] = Field(
+        2_500_000, description="budget of environment steps used for learning"
+    )
     reference_point: tuple[Finite, ...] = Field(
         (), description="of the reported hypervolume; empty: a tenth of the range below the first policies"
     )
@@ -81,7 +83,9 @@ class Config(Section):
     @field_validator("env")
     @classmethod
     def _known_environment(cls, env: str) -> str:
-        envs.make(env)
+        objectives = len(envs.make(env).objectives)
+        if objectives > MOST_OBJECTIVES:
+            raise ValueError(f"{env!r} has {objectives} objectives; a run can have {MOST_OBJECTIVES} at most")
         return env
 
     @field_validator("method")

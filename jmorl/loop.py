@@ -26,7 +26,7 @@ from jmorl.scoring import Scores, paper_scores, raw_scores
 from jmorl.search.metrics import front_metrics
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.scaling import REFERENCE_MARGIN, range_scale
-from jmorl.search.weights import simplex_grid
+from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
 from jmorl.units import initial_units, measured_in
 
@@ -86,7 +86,7 @@ class _Run:
         self.decision_maker = decision_maker
         self.population = population
         self.method = make_method(config, environment)
-        self.metric_weights = simplex_grid(len(environment.objectives), config.search.weight_divisions)
+        self.metric_weights = candidate_grid(len(environment.objectives), config.search.weight_divisions)
         self.initial_key, self.training_key, _ = _keys(config)
 
     def events(self, state: RunState | None) -> Iterator[Event]:

@@ -17,7 +17,7 @@ from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Records, predict
 from jmorl.search.scaling import REFERENCE_MARGIN, Scale, range_scale, search_scale
 from jmorl.search.selection import select_tasks
-from jmorl.search.weights import simplex_grid
+from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
 
 
@@ -86,7 +86,7 @@ class PGMORL(Method[PGMORLState]):
 
     def candidate_weights(self) -> np.ndarray:
         """Return the weights [W, M] that a policy may be trained with after the warm-up."""
-        return simplex_grid(len(self.problem.objectives), self.problem.search.weight_divisions)
+        return candidate_grid(len(self.problem.objectives), self.problem.search.weight_divisions)
 
     def taken_in(self, run: RunState, offspring: Sequence[Policy], tasks: Tasks | None) -> PGMORLState:
         """Return the state with the offspring in buffer and records."""

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 
 from jmorl.search.archive import refuse_unusable
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.scaling import Scale
-from jmorl.search.weights import simplex_grid
+from jmorl.search.weights import finest_divisions, simplex_grid
 
 
 @dataclass(frozen=True)
@@ -44,15 +43,8 @@ def direction_bins(points: np.ndarray, bins: int) -> np.ndarray:
     if points.shape[1] == 2:
         angles = np.arctan2(points[:, 1], points[:, 0])
         return np.minimum((angles / (np.pi / 2) * bins).astype(int), bins - 1)
-    directions = _directions(points.shape[1], bins)
+    directions = simplex_grid(points.shape[1], finest_divisions(points.shape[1], bins))
     return np.argmax(points @ (directions / np.linalg.norm(directions, axis=1, keepdims=True)).T, axis=1)
-
-
-def _directions(objectives: int, most: int) -> np.ndarray:
-    divisions = 1
-    while comb(divisions + objectives, objectives - 1) <= most:
-        divisions += 1
-    return simplex_grid(objectives, divisions)
 
 
 def _best_of_bins(bins: np.ndarray, norms: np.ndarray, size: int) -> np.ndarray:

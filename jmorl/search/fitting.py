@@ -11,6 +11,7 @@ STEEPNESS_BOUNDS = (0.1, 20.0)  # a
 CENTRE_BOUNDS = (-5.0, 5.0)  # b
 OFFSET_BOUNDS = (-1.0, 1.0)  # c
 
+TOGETHER = 2**18  # numbers: a larger problem is worked off in parts
 MOST_ITERATIONS = 100
 CONVERGED = 1e-6  # a fit has ended if a step promises and yields less than this part of its cost
 SMALLEST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-1, 1e9
@@ -32,7 +33,23 @@ def fit_tanh(
     Minimises `s^2 sum(sqrt(1 + (r / s)^2) - 1)`, where `r = importance (curve - y)` and s is the loss scale,
     by Levenberg-Marquardt on all fits together, with the damping of Nielsen (1999). Starts at
     half the range of y, 1, 0 and the mean of y. Every fit needs a record.
+
+    Each fit costs as much as the one with the most records. So those of a large problem are made in parts of up to
+    1, 2, 4, ... records.
     """
+    if x.size <= TOGETHER:
+        return _fit(x, y, importance)
+    records = len(x) - np.argmax(importance[::-1] > 0, axis=0)  # [F] up to the last one
+    parts = np.ceil(np.log2(records))
+    parameters = np.empty((4, x.shape[1]))
+    for each in np.unique(parts):
+        fits = np.flatnonzero(parts == each)
+        most = records[fits].max()
+        parameters[:, fits] = _fit(x[:most, fits], y[:most, fits], importance[:most, fits])
+    return parameters
+
+
+def _fit(x: np.ndarray, y: np.ndarray, importance: np.ndarray) -> np.ndarray:  # [4, F]
     lower, upper, parameters = _box_and_start(y, importance > 0)
     cost = fit_cost(parameters, x, y, importance)
     damping = np.full_like(cost, FIRST_DAMPING)

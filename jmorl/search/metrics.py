@@ -18,7 +18,7 @@ class FrontMetrics:
     """Quality of a front in raw units."""
 
     front_size: int
-    hypervolume: float  # above the run's reference point
+    hypervolume: float  # above the run's reference point; of a large front approximate, see `pareto.hypervolume`
     expected_utility: float  # mean over an even grid of linear weights
     sparsity: float
 

@@ -3,6 +3,10 @@
 import moocore
 import numpy as np
 
+QUICK_OBJECTIVES = 4  # with so many an exact hypervolume takes milliseconds whatever the size of the set
+QUICK_WORK = 6_400  # vectors times two to the power of the objectives: with more of both, what is exact takes seconds
+SAMPLES = 2**16  # of an approximate hypervolume
+
 
 def non_dominated(values: np.ndarray) -> np.ndarray:
     """Which of the vectors [N, M] no other dominates, [N]; of equal ones only the first. N may be zero."""
@@ -14,9 +18,18 @@ def non_dominated(values: np.ndarray) -> np.ndarray:
 def hypervolume(values: np.ndarray, reference: np.ndarray) -> float:
     """The volume that the vectors [N, M] dominate above the reference point [M].
 
-    Vectors that are not above it in every objective contribute nothing; N may be zero.
+    Vectors that are not above it in every objective contribute nothing; N may be zero. Exact where `exact_is_quick`,
+    else approximate: the same for the same vectors, and within a hundredth where that was compared.
     """
-    return float(moocore.hypervolume(values, ref=reference, maximise=True))
+    values = np.array(values, float)  # a copy: moocore negates its argument in place if that was unpickled
+    if exact_is_quick(*values.shape):
+        return float(moocore.hypervolume(values, ref=reference, maximise=True))
+    return float(moocore.hv_approx(values, ref=reference, maximise=True, nsamples=SAMPLES))
+
+
+def exact_is_quick(vectors: int, objectives: int) -> bool:
+    """Whether the exact hypervolume of a set of this size takes some hundredths of a second at most."""
+    return objectives <= QUICK_OBJECTIVES or vectors * 2**objectives <= QUICK_WORK
 
 
 def sparsity(values: np.ndarray) -> float:

@@ -1,10 +1,12 @@
 """The settings of the search."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from jmorl.settings import Count, NonNegative, Section
+
+MOST_OBJECTIVES = 31  # of a hypervolume that moocore takes
 
 
 class SearchConfig(Section):
@@ -21,6 +23,8 @@ class SearchConfig(Section):
         "range", description="search in values scaled by the archive's range, or in values less the reference point"
     )
     sparsity_weight: NonNegative = Field(1.0, description="alpha, cost of a sparse front against its hypervolume")
-    weight_divisions: Count = Field(10, description="steps on each edge of the grid of candidate weights")
-    buffer_bins: Count = Field(100, description="directions of the performance buffer")
+    weight_divisions: Count = Field(
+        10, description="steps on each edge of the grid of candidate weights; fewer where it would have over 100"
+    )
+    buffer_bins: Annotated[int, Field(ge=1, le=10_000)] = Field(100, description="directions of the performance buffer")
     buffer_size: Count = Field(4, description="policies kept in each direction")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from jmorl.search import fitting
 from jmorl.search.fitting import fit_cost, fit_tanh, tanh_curve
 
 X = np.linspace(0.0, 1.0, 11)
@@ -107,6 +108,16 @@ def test_a_fit_does_not_depend_on_its_company() -> None:
     together = fit_tanh(x, y, importance)
     alone = np.concatenate([fit_tanh(x[:, [f]], y[:, [f]], importance[:, [f]]) for f in range(30)], axis=1)
     np.testing.assert_allclose(together, alone, rtol=1e-6, atol=1e-8)
+
+
+def test_a_large_problem_is_worked_off_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fits with one record and with all of them, records at the end of the column included."""
+    x, y, importance = neighbourhood_problems(30, seed=8)
+    importance[1:, 0], importance[:-1, 1] = 0.0, 0.0
+    importance[-1, 1] = 1.0
+    whole = fit_tanh(x, y, importance)
+    monkeypatch.setattr(fitting, "TOGETHER", 100)
+    np.testing.assert_allclose(fit_tanh(x, y, importance), whole, rtol=1e-6, atol=1e-8)
 
 
 def test_records_without_importance_are_not_there() -> None:

@@ -1,14 +1,16 @@
 """Dominance, hypervolume, sparsity and expected utility against independent arithmetic."""
 
+import pickle
 from itertools import combinations
 
+import moocore
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from jmorl.search.pareto import expected_utility, hypervolume, non_dominated, sparsity
+from jmorl.search.pareto import exact_is_quick, expected_utility, hypervolume, non_dominated, sparsity
 
 # small integers: duplicates, ties and dominated vectors abound, and all arithmetic is exact
 vector_sets = st.integers(1, 4).flatmap(
@@ -98,3 +100,20 @@ def test_expected_utility_is_that_of_the_front(values: np.ndarray) -> None:
     one_by_one = np.mean([max(float(z @ w) for z in values) for w in weights])
     assert expected_utility(values, weights) == pytest.approx(one_by_one, rel=1e-12, abs=1e-12)
     assert expected_utility(front, weights) == pytest.approx(one_by_one, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize(("objectives", "count"), [(5, 300), (6, 150), (7, 60), (8, 40)])
+def test_a_large_hypervolume_is_approximate_and_always_the_same(objectives: int, count: int) -> None:
+    directions = np.abs(np.random.default_rng(0).normal(size=(count, objectives)))
+    values, reference = directions / np.linalg.norm(directions, axis=1, keepdims=True), np.full(objectives, -0.1)
+    assert not exact_is_quick(count, objectives)
+    found = hypervolume(values, reference)
+    assert found == hypervolume(values, reference)
+    assert found == pytest.approx(moocore.hypervolume(values.copy(), ref=reference, maximise=True), rel=0.01)
+
+
+def test_the_vectors_of_a_hypervolume_stay_as_they_are() -> None:
+    """moocore takes what was unpickled for a copy of its own."""
+    values = pickle.loads(pickle.dumps(np.array([[1.0, 2.0], [2.0, 1.0]])))
+    assert hypervolume(values, np.zeros(2)) == 3.0
+    np.testing.assert_array_equal(values, [[1.0, 2.0], [2.0, 1.0]])

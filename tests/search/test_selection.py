@@ -1,5 +1,6 @@
 """Task selection against the greedy rule written out, ties included, and its parts against their definitions."""
 
+import moocore
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from jmorl.search.pareto import hypervolume, non_dominated, sparsity
-from jmorl.search.selection import gain_limits, planar_gains, select_tasks, sparsities_with
+from jmorl.search.selection import select_tasks, sparsities_with, sparsity_limits
 
 # multiples of 1/4: hypervolumes are exact, so ties are true ties; many predictions are equal or dominated
 quarters = st.integers(-1, 8).map(lambda n: n / 4)
@@ -73,27 +74,60 @@ def test_selection_is_the_greedy_rule_without_ties(objectives: int) -> None:
     assert [(task.candidate, task.weight) for task in tasks] == expected
 
 
-@given(problems(st.just(2)))
-def test_planar_gains_are_differences_of_hypervolume(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    points, front, reference = uncovered(*problem)
-    gains = [hypervolume(np.vstack([front, point]), reference) - hypervolume(front, reference) for point in points]
-    np.testing.assert_array_equal(planar_gains(points, front, reference), gains)
-
-
-@given(problems(st.integers(2, 4)))
-def test_gains_keep_to_their_limits(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    points, front, reference = uncovered(*problem)
-    gains = [hypervolume(np.vstack([front, point]), reference) - hypervolume(front, reference) for point in points]
-    limits = gain_limits(points, front, reference)
-    assert (limits >= np.array(gains)).all()
-    np.testing.assert_array_equal(gain_limits(points, front[:0], reference), gain_limits(points, front - 9, reference))
-
-
 @given(problems(st.integers(2, 4)))
 def test_sparsities_are_those_of_the_extended_fronts(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     points, front, _ = uncovered(*problem)
     expected = [sparsity(np.vstack([front, point])) for point in points]
     np.testing.assert_allclose(sparsities_with(points, front), expected, rtol=1e-12)
+
+
+@given(problems(st.integers(2, 5)))
+def test_sparsities_keep_to_their_limits(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    points, front, _ = uncovered(*problem)
+    assert (sparsity_limits(points, front) <= sparsities_with(points, front)).all()
+
+
+def test_limits_of_sparsities_are_close() -> None:
+    """Where a point beats no member they are the sparsities, but for a member more in the mean."""
+    front, points = sphere(30, 4, seed=0), sphere(20, 4, seed=1)
+    limits, exact = sparsity_limits(points, front), sparsities_with(points, front)
+    np.testing.assert_allclose(limits, exact, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("objectives", "members"), [(4, 60), (5, 60), (6, 40)])
+def test_with_many_objectives_and_pairs_the_choice_is_next_to_the_best(objectives: int, members: int) -> None:
+    """More pairs than are compared, so that it depends on the estimates which are; scored by exact hypervolumes."""
+    front, reference = sphere(members, objectives, seed=2), np.full(objectives, -0.1)
+    generator = np.random.default_rng(3)
+    predictions = front[:, None] + generator.normal(0.01, 0.03, size=(members, 30, objectives))
+    (task,) = select_tasks(predictions, front, reference, 1, 1.0, generator)
+    points, front, _ = uncovered(predictions, front, reference)
+    scores = np.array([exact_hypervolume(np.vstack([front, point]), reference) for point in points])
+    scores -= exact_hypervolume(front, reference) + sparsities_with(points, front) - sparsity(front)
+    chosen = scores[(points == task.predicted).all(axis=1)]
+    assert len(points) > 1024 and chosen.size == 1
+    assert chosen[0] >= 0.9 * scores.max()
+
+
+@pytest.mark.parametrize("objectives", [4, 8, 31])
+def test_many_objectives_give_as_many_tasks_as_asked_for(objectives: int) -> None:
+    generator = np.random.default_rng(4)
+    front = sphere(20, objectives, seed=4)
+    predictions = front[:, None] + generator.normal(0.01, 0.03, size=(20, objectives, objectives))
+    arguments = (predictions, front, front.min(axis=0) - 0.1, 6, 1.0)
+    tasks, again = (select_tasks(*arguments, np.random.default_rng(0)) for _ in range(2))
+    assert [(t.candidate, t.weight) for t in tasks] == [(t.candidate, t.weight) for t in again]
+    assert len({(task.candidate, task.weight) for task in tasks}) == 6
+
+
+def sphere(count: int, objectives: int, seed: int) -> np.ndarray:
+    """Points of the unit sphere, none of which dominates another."""
+    directions = np.abs(np.random.default_rng(seed).normal(size=(count, objectives)))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def exact_hypervolume(values: np.ndarray, reference: np.ndarray) -> float:
+    return float(moocore.hypervolume(values.copy(), ref=reference, maximise=True))
 
 
 def uncovered(

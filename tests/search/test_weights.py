@@ -6,7 +6,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from jmorl.search.weights import evenly_spaced_weights, simplex_grid
+from jmorl.search.weights import candidate_grid, evenly_spaced_weights, simplex_grid
 
 
 @pytest.mark.parametrize(("objectives", "divisions"), [(1, 4), (2, 10), (3, 4), (4, 3), (5, 2)])
@@ -17,7 +17,24 @@ def test_grid_is_all_multiples_in_order(objectives: int, divisions: int) -> None
     np.testing.assert_array_equal(grid, np.array(steps) / divisions)
 
 
-@pytest.mark.parametrize("objectives", [2, 3, 4, 6])
+@pytest.mark.parametrize(("objectives", "count"), [(2, 11), (3, 66)])
+def test_candidates_of_few_objectives_are_the_grid_itself(objectives: int, count: int) -> None:
+    grid = candidate_grid(objectives, 10)
+    np.testing.assert_array_equal(grid, simplex_grid(objectives, 10))
+    assert len(grid) == count
+
+
+@pytest.mark.parametrize("divisions", [10, 2**32 - 1])
+@pytest.mark.parametrize("objectives", [2, 3, 4, 5, 8, 13, 31])
+def test_candidates_are_at_most_a_hundred_and_have_the_corners(objectives: int, divisions: int) -> None:
+    grid = candidate_grid(objectives, divisions)
+    assert objectives <= len(grid) <= 100
+    assert {tuple(corner) for corner in np.eye(objectives)} <= {tuple(weight) for weight in grid}
+    steps = round(1 / grid[grid > 0].min())
+    assert steps == divisions or comb(steps + objectives, objectives - 1) > 100
+
+
+@pytest.mark.parametrize("objectives", [2, 3, 4, 6, 10, 31])
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 6, 12, 40])
 def test_spread_weights_are_different_and_on_the_simplex(objectives: int, count: int) -> None:
     weights = evenly_spaced_weights(objectives, count)
@@ -38,7 +55,9 @@ def test_one_weight_is_equal(objectives: int) -> None:
 
 def test_more_objectives_start_with_the_corners_and_the_centre() -> None:
     np.testing.assert_array_equal(evenly_spaced_weights(4, 2), np.eye(4)[:2])
-    np.testing.assert_allclose(evenly_spaced_weights(3, 4), [*np.eye(3), np.full(3, 1 / 3)])
+    for objectives in (3, 12, 20):
+        centre = np.full(objectives, 1 / objectives)
+        np.testing.assert_allclose(evenly_spaced_weights(objectives, objectives + 1), [*np.eye(objectives), centre])
 
 
 @pytest.mark.parametrize(("objectives", "count"), [(3, 6), (3, 20), (4, 12)])

@@ -1,0 +1,70 @@
+"""How long the host takes to choose the tasks of a generation, by the number of objectives; printed.
+
+    python -m benchmarks.selection      (a minute)
+
+400 candidates that hardly dominate each other, all of them in the front, 600 records and the default grid of weights:
+about what a run of a hundred generations has. The seconds of the metrics are those of the front's row in metrics.csv.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from jmorl.config import SearchConfig
+from jmorl.search.metrics import front_metrics
+from jmorl.search.prediction import Records, predict
+from jmorl.search.selection import select_tasks
+from jmorl.search.weights import candidate_grid
+
+CANDIDATES, RECORDS, TASKS = 400, 600, 6
+OBJECTIVES = range(2, 9)
+
+
+def main() -> None:
+    """Measure and print."""
+    shown = Table("objectives", "weights", "predict", "select", "together", "metrics", title="seconds of a generation")
+    for objectives in OBJECTIVES:
+        weights, seconds = measured(objectives)
+        shown.add_row(str(objectives), str(weights), *(f"{each:.2f}" for each in seconds))
+    Console().print(shown)
+
+
+def measured(objectives: int) -> tuple[int, tuple[float, ...]]:
+    """How many candidate weights there are, and the seconds of each step and of the first two together."""
+    generator = np.random.default_rng(objectives)
+    weights = candidate_grid(objectives, SearchConfig().weight_divisions)
+    candidates, reference = front(generator, objectives), np.full(objectives, -0.1)
+    predicting, predictions = timed(predict, candidates, weights, records(generator, candidates, weights))
+    selecting, _ = timed(select_tasks, predictions, candidates, reference, TASKS, 1.0, generator)
+    measuring, _ = timed(front_metrics, candidates, reference, weights)
+    return len(weights), (predicting, selecting, predicting + selecting, measuring)
+
+
+def front(generator: np.random.Generator, objectives: int) -> np.ndarray:
+    """Points near the unit sphere, [CANDIDATES, M]."""
+    directions = np.abs(generator.normal(size=(CANDIDATES, objectives)))
+    lengths = generator.normal(1.0, 0.02, size=(CANDIDATES, 1))
+    return lengths * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def records(generator: np.random.Generator, candidates: np.ndarray, weights: np.ndarray) -> Records:
+    """Tasks whose parents were somewhat worse than the candidates, and that led towards their weights."""
+    parents = 0.9 * candidates[generator.integers(len(candidates), size=RECORDS)]
+    used = weights[generator.integers(len(weights), size=RECORDS)]
+    changes = 0.1 * (used - 1 / weights.shape[1]) + generator.normal(0.02, 0.02, size=parents.shape)
+    return Records(parents, used, parents + changes)
+
+
+def timed(function: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
+    """Seconds and result of a call."""
+    started = time.perf_counter()
+    result = function(*arguments)
+    return time.perf_counter() - started, result
+
+
+if __name__ == "__main__":
+    main()
