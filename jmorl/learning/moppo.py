@@ -4,6 +4,7 @@ No population axis here; `jmorl.learning.population` vmaps. PPO after Schulman e
 form after Xu et al. 2020 (PGMORL).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ import jax.numpy as jnp
 import optax
 from flax import struct
 
-from envs.core import Environment, EpisodeState
+from envs.core import Environment, EpisodeState, Objective
 from jmorl.learning.losses import action_bound_loss, clipped_surrogate_loss, clipped_value_loss, normalize_advantages
 from jmorl.learning.networks import Actor, critic_network, gaussian_entropy, gaussian_log_probability
 from jmorl.learning.returns import discounted_sums, generalized_advantages
@@ -54,7 +55,7 @@ class Batch(NamedTuple):
     """What one update learns from; minibatches are slices of its leading axis."""
 
     observation: jax.Array  # [B, O] normalised
-    action: jax.Array  # [B, A]
+    action: jax.Array  # [B, A] normalised
     log_probability: jax.Array  # [B]
     value: jax.Array  # [B, M] in reward-scaled units
     advantage: jax.Array  # [B] scalarised
@@ -76,11 +77,22 @@ class Diagnostics(NamedTuple):
     entropy: jax.Array  # []
     approximate_kl: jax.Array  # [] between the policy that acted and the updated one
     fault: jax.Array  # [] int32 index into FAULTS
+    fault_component: jax.Array  # [] int32, the first of the observation or reward; meaningless of other faults
     fault_iteration: jax.Array  # [] int32, from 1; meaningless without a fault
 
     def means(self) -> dict[str, float]:
         """The numbers of a population [P], averaged over its agents."""
         return {name: float(getattr(self, name).mean()) for name in self._fields if not name.startswith("fault")}
+
+    def cause(self, agent: int, objectives: Sequence[Objective]) -> str:
+        """What stopped being finite for an agent of a population: `observation[3]`, `reward of energy`, or `loss`."""
+        fault, component = FAULTS[self.fault[agent]], int(self.fault_component[agent])
+        match fault:
+            case "observation":
+                return f"observation[{component}]"
+            case "reward":
+                return f"reward of {objectives[component].name}"
+        return fault
 
 
 FAULTS = ("none", "observation", "reward", "loss")
@@ -134,7 +146,7 @@ class MOPPO:
         """
         rollout_state_key, iterations_key = jax.random.split(key)
         zero = jnp.zeros(())
-        start = Diagnostics(zero, zero, zero, zero, jnp.array(0), jnp.array(0))
+        start = Diagnostics(zero, zero, zero, zero, jnp.array(0), jnp.array(0), jnp.array(0))
 
         def body(index: jax.Array, carry: Any) -> Any:
             train_state, rollout_state, previous = carry
@@ -174,7 +186,8 @@ class MOPPO:
             update_statistics(train_state.observation_statistics, trajectory.observation),
             return_statistics,
         )
-        return updated, rollout_state, diagnostics._replace(fault=_fault(trajectory, parameters, diagnostics))
+        fault, component = _fault(trajectory, parameters, diagnostics)
+        return updated, rollout_state, diagnostics._replace(fault=fault, fault_component=component)
 
     def collect(
         self, train_state: TrainState, rollout_state: RolloutState, key: jax.Array
@@ -270,7 +283,7 @@ class MOPPO:
         )
         value_loss = clipped_value_loss(values, batch.value, batch.returns, self.config.clip)
         entropy = gaussian_entropy(log_std)
-        bound_loss = action_bound_loss(mean, self.environment.action_low, self.environment.action_high)
+        bound_loss = action_bound_loss(mean, *self.environment.action_box.normalized_bounds)
         loss = (
             policy_loss
             + self.config.value_coefficient * value_loss
@@ -278,10 +291,10 @@ class MOPPO:
             - self.config.entropy_coefficient * entropy
         )
         kl = (batch.log_probability - log_probability).mean()
-        return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0))
+        return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0), jnp.array(0))
 
     def policy(self, train_state: TrainState) -> Any:
-        """The agent as a function of one raw observation [O]: (mean action [A], log-std [A])."""
+        """The agent as a function of one raw observation [O]: mean and log-std [A] of the normalised action."""
         return lambda observation: self.actor.apply(
             train_state.parameters["actor"], normalize(train_state.observation_statistics, observation)
         )
@@ -290,10 +303,16 @@ class MOPPO:
         self, train_state: TrainState, keys: jax.Array, sampled: bool = False, traced: bool = False
     ) -> EpisodeReturns:
         """One episode for each key [episodes], as `episode_returns`, with the agent's frozen statistics."""
-        policy = self.policy(train_state)
-        return jax.vmap(
-            lambda key: episode_returns(self.environment, policy, key, self.config.discount, sampled, traced)
-        )(keys)
+        policy, box = self.policy(train_state), self.environment.action_box
+
+        def act(observation: jax.Array, noise: jax.Array | None) -> jax.Array:
+            mean, log_std = policy(observation)
+            return box.action(mean if noise is None else mean + jnp.exp(log_std) * noise)
+
+        def episode(key: jax.Array) -> EpisodeReturns:
+            return episode_returns(self.environment, act, key, self.config.discount, sampled, traced)
+
+        return jax.vmap(episode)(keys)
 
 
 def _random_order(key: jax.Array, size: int) -> jax.Array:
@@ -309,16 +328,26 @@ def _random_order(key: jax.Array, size: int) -> jax.Array:
     return (words & ((1 << index_bits) - 1)).astype(jnp.int32)
 
 
-def _fault(trajectory: Trajectory, parameters: Parameters, diagnostics: Diagnostics) -> jax.Array:
-    """The first cause, in the order in which one would bring about the next, of numbers that are not finite."""
+def _fault(
+    trajectory: Trajectory,  # [E, T, ...]
+    parameters: Parameters,
+    diagnostics: Diagnostics,
+) -> tuple[jax.Array, jax.Array]:
+    """The first cause, in the order in which one would bring about the next, of numbers that are not finite.
 
-    def broken(tree: Any) -> jax.Array:
-        return jnp.stack([~jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(tree)]).any()
+    With it comes the first component in which it is found.
+    """
 
-    observations = (trajectory.observation, trajectory.final_observation)
+    def broken(numbers: jax.Array) -> jax.Array:  # [E, T, N] -> [N]
+        return ~jnp.isfinite(numbers).all((0, 1))
+
+    observation = broken(trajectory.observation) | broken(trajectory.final_observation)
+    reward = broken(trajectory.reward)
     losses = (parameters, diagnostics.policy_loss, diagnostics.value_loss)
-    faults = jnp.stack([broken(observations), broken(trajectory.reward), broken(losses)])
-    return jnp.where(faults.any(), 1 + faults.argmax(), 0)
+    loss = jnp.stack([~jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(losses)])
+    faults = jnp.stack([observation.any(), reward.any(), loss.any()])
+    fault = jnp.where(faults.any(), 1 + faults.argmax(), 0)
+    return fault, jnp.where(observation.any(), observation.argmax(), reward.argmax())
 
 
 def _keep_first_fault(previous: Diagnostics, current: Diagnostics, iteration: jax.Array) -> Diagnostics:
@@ -326,5 +355,6 @@ def _keep_first_fault(previous: Diagnostics, current: Diagnostics, iteration: ja
     faulty = previous.fault > 0
     return current._replace(
         fault=jnp.where(faulty, previous.fault, current.fault),
+        fault_component=jnp.where(faulty, previous.fault_component, current.fault_component),
         fault_iteration=jnp.where(faulty, previous.fault_iteration, iteration),
     )

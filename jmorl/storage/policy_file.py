@@ -1,8 +1,11 @@
 """A policy as one file: a NumPy archive with a JSON header, read without pickle and without JAX.
 
 The header names the environment, objectives with their units, mean undiscounted returns, the score the run went by and
-its spread, weights and origin, and says how the network is computed; the arrays are the actor's layers and the
-observation statistics. `load_policy(path)(observation)` is the deterministic action.
+its spread, weights and origin, and says how the network is computed; the arrays are the actor's layers, the
+observation statistics, and how the network's output is mapped onto the action box. `load_policy(path)(observation)` is
+the deterministic action.
+
+Format 1 had the action's limits in its header and only clipped to them.
 """
 
 import importlib.metadata
@@ -13,13 +16,15 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, NotRequired
 
 import numpy as np
 from pydantic import TypeAdapter
 from typing_extensions import TypedDict
 
 import envs
+from envs.actions import ActionBox
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
@@ -29,7 +34,7 @@ from jmorl.storage.files import written_whole
 from jmorl.storage.layout import Layout
 from jmorl.storage.versions import NewerFormat, check_format
 
-FORMAT = 1
+FORMAT = 2
 INPUT = {"variance_floor": VARIANCE_FLOOR, "clip": NORMALIZED_CLIP}
 
 
@@ -49,7 +54,7 @@ class _Header(TypedDict):
 
     environment: str
     objectives: list[_Objective]
-    action_limits: list[Any]
+    action_limits: NotRequired[list[Any]]  # of the first format; later ones have the box as arrays
     id: int
     values: list[float]
     discount: float
@@ -72,14 +77,19 @@ class StoredPolicy:
     log_std: np.ndarray  # [A]
     observation_mean: np.ndarray  # [O]
     observation_variance: np.ndarray  # [O]
+    box: ActionBox
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """The deterministic action, clipped to the environment's limits."""
-        low, high = self.header["action_limits"]
-        return np.clip(self.mean_action(np.asarray(observation, np.float32)), low, high)
+        """The deterministic action in the environment's own units, within its box."""
+        action: np.ndarray = self.action(np.asarray(observation, np.float32))
+        return action
 
-    def mean_action(self, observation: Any, xp: Any = np) -> Any:
-        """The unclipped mean action; `xp` may be `jax.numpy` to trace it."""
+    def action(self, observation: Any, xp: ModuleType = np) -> Any:
+        """The same; `xp` may be `jax.numpy` to trace it."""
+        return self.box.action(self._network(observation, xp), xp)
+
+    def _network(self, observation: Any, xp: ModuleType) -> Any:
+        """The mean of the normalised action."""
         floor, limit = self.header["network"]["variance_floor"], self.header["network"]["clip"]
         x = (observation - self.observation_mean) / xp.sqrt(self.observation_variance + floor)
         x = xp.clip(x, -limit, limit)
@@ -101,7 +111,6 @@ def save_policy(
         "jmorl": importlib.metadata.version("jmorl"),
         "environment": config.env,
         "objectives": [vars(objective) for objective in environment.objectives],
-        "action_limits": [environment.action_low, environment.action_high],
         "id": policy.id,
         "generation": policy.generation,
         "parent": policy.parent,
@@ -114,13 +123,14 @@ def save_policy(
         "discount": config.ppo.discount,
         "run": {"id": run, "config": config.identity(), "method": config.method, "seed": config.seed},
         "network": {
-            "sizes": [environment.observation_size, *config.ppo.hidden_sizes, environment.action_size],
+            "sizes": [int(environment.observation_size), *config.ppo.hidden_sizes, int(environment.action_size)],
             "activation": "tanh",
             **INPUT,
         },
     }
+    box = {f"action_{name}": array for name, array in environment.action_box._asdict().items()}
     with written_whole(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, header=np.array(json.dumps(header)), **_network(policy))
+        np.savez(file, header=np.array(json.dumps(header)), **_network(policy), **box)
 
 
 def holds(path: Path, policy: Policy) -> bool:
@@ -131,12 +141,12 @@ def holds(path: Path, policy: Policy) -> bool:
     except (PolicyFileError, KeyError, DocumentError):
         return False
     network = _network(policy)
-    same = arrays.keys() == network.keys() and all(np.array_equal(arrays[name], network[name]) for name in network)
+    same = arrays.keys() >= network.keys() and all(np.array_equal(arrays[name], network[name]) for name in network)
     return same and header.get("id") == policy.id
 
 
 def _network(policy: Policy) -> dict[str, Any]:
-    """Return the arrays of a policy file, but for the header."""
+    """Return the arrays of a policy file that the policy itself determines."""
     parameters, statistics = policy.snapshot.parameters["actor"]["params"], policy.snapshot.observation_statistics
     arrays = {
         "log_std": parameters["log_std"],
@@ -178,8 +188,9 @@ def load_policy(path: Path | str) -> StoredPolicy:
         check_fields(header, _HEADER, "its header")
         count = sum(name.endswith("_kernel") for name in arrays)
         layers = tuple((arrays[f"layer_{i}_kernel"], arrays[f"layer_{i}_bias"]) for i in range(count))
+        box = _clipping_box(header, len(arrays["log_std"])) if header["format"] == 1 else _box(arrays)
         policy = StoredPolicy(
-            header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"]
+            header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"], box
         )
         _check_use(policy)
     except KeyError as error:
@@ -219,6 +230,17 @@ def _checked_arrays(path: Path) -> dict[str, np.ndarray]:
         raise PolicyFileError(f"{path} cannot be read: {error.strerror or error}") from error
     except (ValueError, KeyError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise PolicyFileError(f"{path} is not a policy file: {error}") from error
+
+
+def _box(arrays: dict[str, np.ndarray]) -> ActionBox:
+    """How the network's output is mapped onto the action box."""
+    return ActionBox(*(arrays[f"action_{name}"] for name in ActionBox._fields))
+
+
+def _clipping_box(header: dict[str, Any], size: int) -> ActionBox:
+    """The same of a file of format 1."""
+    low, high = (np.full(size, limit, np.float32) for limit in header["action_limits"])
+    return ActionBox(low, high, np.zeros(size, np.float32), np.ones(size, np.float32))
 
 
 def policy_environment(environment_id: str) -> Environment[Any]:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import envs
-from envs.checks import check_environment
 from envs.core import Environment
 from jmorl.config import Config, ConfigError
 from jmorl.decision.protocol import DecisionMaker
@@ -18,6 +17,7 @@ from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
 from jmorl.display.commands import command
 from jmorl.events import Event
+from jmorl.learning.check import check_programs
 from jmorl.learning.population import Population
 from jmorl.loop import make_method, run
 from jmorl.search.policy import Policy
@@ -128,7 +128,7 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
 
 def _environment(config: Config) -> Environment[Any]:
     environment = envs.make(config.env)
-    check_environment(environment)
+    check_programs(environment, config.learning, envs.make_anew(config.env))
     return environment
 
 
