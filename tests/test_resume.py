@@ -255,6 +255,16 @@ def test_a_run_that_was_killed_before_it_had_a_config_can_be_begun(whole, small_
     assert not (path / ".config.toml.partial").exists()
 
 
+@pytest.mark.parametrize("content", ["[]", '{"name": "My page", "icons": []}'])
+def test_a_manifest_of_something_else_is_not_overwritten(small_config, tmp_path, content):
+    (tmp_path / "manifest.json").write_text(content)
+    with pytest.raises(FolderInUse, match="choose another folder, or overwrite it with --force"):
+        train(tmp_path, small_config)
+    with pytest.raises(CannotContinue, match="start again with `jmorl train --force`"):
+        resume(tmp_path)
+    assert (tmp_path / "manifest.json").read_text() == content
+
+
 def test_a_run_that_has_lost_its_config_is_not_overwritten(copy, small_config):
     (copy / "config.toml").unlink()
     with pytest.raises(FolderInUse, match="without its config.toml; put that back and continue the run"):

@@ -258,8 +258,8 @@ def _with_snapshots(folder: RunFolder, state: RunState) -> tuple[Policy, ...]:
 
 def _policy_files(layout: Layout) -> dict[int, Path]:
     """Return the files of a run's policies, by id."""
-    numbers = sorted(int(file.stem) for file in layout.policy_files.glob("*.npz") if re.fullmatch("[0-9]+", file.stem))
-    return {number: layout.policy(number) for number in numbers}
+    files = sorted(file for file in layout.policy_files.glob("*.npz") if re.fullmatch("[0-9]+", file.stem))
+    return {int(file.stem): file for file in files if file == layout.policy(int(file.stem))}
 
 
 def _is_sound(file: Path, number: int, policy: Policy | None) -> bool:

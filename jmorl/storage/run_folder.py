@@ -42,7 +42,7 @@ from jmorl.storage.decision_log import DecisionLog
 from jmorl.storage.files import partial_path, remove, write_json, write_text
 from jmorl.storage.layout import Layout
 from jmorl.storage.lock import FolderInUse, RunLock, check_unlocked
-from jmorl.storage.manifest import Manifest, new_manifest, now
+from jmorl.storage.manifest import Manifest, new_manifest, now, read_manifest
 from jmorl.storage.policy_file import save_policy
 
 RUNS = Path("runs")  # where runs are that were not given a folder
@@ -239,7 +239,7 @@ def check_free(path: Path, force: bool) -> None:
 def _check_contents(layout: Layout, force: bool) -> None:
     """Raise FolderInUse if what is in the folder, or what is not, must not be overwritten."""
     path = layout.root
-    if not path.exists() or all(each in _leftovers(layout) for each in path.iterdir()):
+    if not has_begun(layout):
         return
     if not _has_run(layout):
         raise FolderInUse(f"{path} is not empty, and not a run; choose another folder")
@@ -263,8 +263,8 @@ def _has_run(layout: Layout) -> bool:
 
 
 def has_begun(layout: Layout) -> bool:
-    """Return whether a folder with a manifest has more of a run than a process leaves that is killed in making it."""
-    return not all(each in _leftovers(layout) for each in layout.root.iterdir())
+    """Return whether a folder has more in it than a process leaves that is killed before its run has begun."""
+    return layout.root.exists() and not set(layout.root.iterdir()) <= _leftovers(layout)
 
 
 def _empty(layout: Layout) -> None:
@@ -282,6 +282,11 @@ def folder_bytes(path: Path) -> int:
     return sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
 
 
-def _leftovers(layout: Layout) -> tuple[Path, ...]:
+def _leftovers(layout: Layout) -> set[Path]:
     """Return what a process may leave that ended before the folder was a run. A run has begun with its config."""
-    return layout.lock, layout.manifest, partial_path(layout.manifest), partial_path(layout.config)
+    ours = {layout.lock, partial_path(layout.manifest), partial_path(layout.config)}
+    try:
+        read_manifest(layout.root)
+    except (OSError, ValueError):  # somebody else's file of that name is not ours to overwrite
+        return ours
+    return {*ours, layout.manifest}

@@ -15,7 +15,8 @@ def check_format(fields: Mapping[str, Any], known: int, name: str) -> None:
     """Raise NewerFormat if `fields["format"]` is above the one known, DocumentError if it is none."""
     found = fields.get("format")
     if type(found) is not int or found < 1:
-        raise DocumentError(f"{name} is damaged: its format is {found!r}, not a number from 1 to {known}")
+        problem = f"format: {found!r} is not a whole number above zero" if "format" in fields else "format is missing"
+        raise DocumentError(f"{name} is damaged: {problem}")
     if found > known:
         here = importlib.metadata.version("jmorl")
         raise NewerFormat(

@@ -104,8 +104,8 @@ def without(name):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (without("format"), "its format is None, not a number from 1"),
-        (lambda manifest: manifest.update(format="1"), "its format is '1', not a number"),
+        (without("format"), "format is missing"),
+        (lambda manifest: manifest.update(format="1"), "format: '1' is not a whole number"),
         (without("run"), "run is missing"),
         (without("packages"), "packages is missing"),
         (lambda manifest: manifest.update(packages=[]), "packages: input should be a valid dictionary"),

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from jmorl.learning.moppo import MOPPO
-from jmorl.storage.policy_file import FORMAT, PolicyFileError, export_policy, load_policy, save_policy
+from jmorl.storage import files
+from jmorl.storage.policy_file import FORMAT, PolicyFileError, export_policy, holds, load_policy, save_policy
 from jmorl.storage.versions import NewerFormat
 
 
@@ -122,3 +123,75 @@ def test_a_file_of_before_networks_were_described_acts_the_same(saved):
     actions = load_policy(path)(observations)
     rewritten(path, lambda header: header.pop("network"))
     np.testing.assert_array_equal(load_policy(path)(observations), actions)
+
+
+def test_no_flipped_bit_passes_for_a_policy(saved):
+    """NumPy alone reads past some, in the head of an array for instance."""
+    folder, policy = saved
+    path = folder / "policies" / "00017.npz"
+    content, generator = path.read_bytes(), np.random.default_rng(0)
+    passed = 0
+    for place in [*range(0, 400, 4), *generator.integers(len(content), size=200)]:
+        changed = bytearray(content)
+        changed[place] ^= 1 << int(generator.integers(8))
+        path.write_bytes(changed)
+        try:
+            loaded = load_policy(path)
+        except (PolicyFileError, NewerFormat):
+            assert not holds(path, policy)
+        else:  # a time or an attribute in the list of contents, which nobody reads
+            passed += 1
+            assert holds(path, policy) and loaded.header["id"] == 17
+    assert passed < 150
+    path.write_bytes(content)
+    assert holds(path, policy)
+
+
+def test_a_file_of_the_first_version_has_its_deviation_by_todays_name(saved):
+    path = saved[0] / "chosen.npz"
+    std = load_policy(path).header["std"]
+    rewritten(path, lambda header: header.update(spread=header.pop("std")))
+    header = load_policy(path).header
+    assert header["std"] == std and "spread" not in header
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda header: header.pop("environment"), "environment is missing"),
+        (lambda header: header.update(id="17", values=None), "id: input should be a valid integer; values: "),
+        (lambda header: header.update(values=[1.0]), "1 values for 3 objectives"),
+        (lambda header: header.update(action_limits=[1]), "not enough values to unpack"),
+        (lambda header: header["network"].pop("clip"), "network.clip is missing"),
+        (lambda header: header.pop("format"), "format is missing"),
+    ],
+)
+def test_a_header_that_does_not_say_what_is_needed_is_refused(saved, change, message):
+    path = saved[0] / "chosen.npz"
+    rewritten(path, change)
+    with pytest.raises(PolicyFileError, match=f"chosen.npz is not a policy file: .*{message}"):
+        load_policy(path)
+
+
+def test_layers_that_do_not_fit_each_other_are_refused(saved):
+    path = saved[0] / "chosen.npz"
+    with np.load(path) as file:
+        arrays = dict(file)
+    np.savez(path, **arrays | {"layer_1_kernel": arrays["layer_1_kernel"][:-1]})
+    with pytest.raises(PolicyFileError, match="chosen.npz is not a policy file"):
+        load_policy(path)
+
+
+def test_a_file_is_on_the_disk_before_it_is_visible(saved, environment, small_config, monkeypatch):
+    """Its content first, then its name."""
+    folder, policy = saved
+    path, done = folder / "policies" / "00018.npz", []
+    sync = files.sync
+
+    def noted(place):
+        done.append((place.name, path.exists()))
+        sync(place)
+
+    monkeypatch.setattr(files, "sync", noted)
+    save_policy(path, policy, environment, small_config)
+    assert done == [(".00018.npz.partial", False), ("policies", True)]
