@@ -4,6 +4,7 @@ No population axis here; `jmorl.learning.population` vmaps. PPO after Schulman e
 form after Xu et al. 2020 (PGMORL).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ import jax.numpy as jnp
 import optax
 from flax import struct
 
-from envs.core import Environment, EpisodeState
+from envs.core import Environment, EpisodeState, Objective
 from jmorl.config import PPOConfig
 from jmorl.learning.losses import action_bound_loss, clipped_surrogate_loss, clipped_value_loss, normalize_advantages
 from jmorl.learning.networks import Actor, critic_network, gaussian_entropy, gaussian_log_probability
@@ -76,11 +77,22 @@ class Diagnostics(NamedTuple):
     entropy: jax.Array  # []
     approximate_kl: jax.Array  # [] between the policy that acted and the updated one
     fault: jax.Array  # [] int32 index into FAULTS
+    fault_component: jax.Array  # [] int32, the first of the observation or reward; meaningless of other faults
     fault_iteration: jax.Array  # [] int32, from 1; meaningless without a fault
 
     def means(self) -> dict[str, float]:
         """The numbers of a population [P], averaged over its agents."""
         return {name: float(getattr(self, name).mean()) for name in self._fields if not name.startswith("fault")}
+
+    def cause(self, agent: int, objectives: Sequence[Objective]) -> str:
+        """What stopped being finite for an agent of a population: `observation[3]`, `reward of energy`, or `loss`."""
+        fault, component = FAULTS[self.fault[agent]], int(self.fault_component[agent])
+        match fault:
+            case "observation":
+                return f"observation[{component}]"
+            case "reward":
+                return f"reward of {objectives[component].name}"
+        return fault
 
 
 FAULTS = ("none", "observation", "reward", "loss")
@@ -134,7 +146,7 @@ class MOPPO:
         """
         rollout_state_key, iterations_key = jax.random.split(key)
         zero = jnp.zeros(())
-        start = Diagnostics(zero, zero, zero, zero, jnp.array(0), jnp.array(0))
+        start = Diagnostics(zero, zero, zero, zero, jnp.array(0), jnp.array(0), jnp.array(0))
 
         def body(index: jax.Array, carry: Any) -> Any:
             train_state, rollout_state, previous = carry
@@ -174,7 +186,8 @@ class MOPPO:
             update_statistics(train_state.observation_statistics, trajectory.observation),
             return_statistics,
         )
-        return updated, rollout_state, diagnostics._replace(fault=_fault(trajectory, parameters, diagnostics))
+        fault, component = _fault(trajectory, parameters, diagnostics)
+        return updated, rollout_state, diagnostics._replace(fault=fault, fault_component=component)
 
     def collect(
         self, train_state: TrainState, rollout_state: RolloutState, key: jax.Array
@@ -278,10 +291,10 @@ class MOPPO:
             - self.config.entropy_coefficient * entropy
         )
         kl = (batch.log_probability - log_probability).mean()
-        return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0))
+        return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0), jnp.array(0))
 
     def policy(self, train_state: TrainState) -> Any:
-        """The agent as a function of one raw observation [O]: (mean action [A], log-std [A])."""
+        """The agent as a function of one raw observation [O]: mean and log-std [A] of the normalised action."""
         return lambda observation: self.actor.apply(
             train_state.parameters["actor"], normalize(train_state.observation_statistics, observation)
         )
@@ -309,16 +322,26 @@ def _random_order(key: jax.Array, size: int) -> jax.Array:
     return (words & ((1 << index_bits) - 1)).astype(jnp.int32)
 
 
-def _fault(trajectory: Trajectory, parameters: Parameters, diagnostics: Diagnostics) -> jax.Array:
-    """The first cause, in the order in which one would bring about the next, of numbers that are not finite."""
+def _fault(
+    trajectory: Trajectory,  # [E, T, ...]
+    parameters: Parameters,
+    diagnostics: Diagnostics,
+) -> tuple[jax.Array, jax.Array]:
+    """The first cause, in the order in which one would bring about the next, of numbers that are not finite.
 
-    def broken(tree: Any) -> jax.Array:
-        return jnp.stack([~jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(tree)]).any()
+    With it comes the first component in which it is found.
+    """
 
-    observations = (trajectory.observation, trajectory.final_observation)
+    def broken(numbers: jax.Array) -> jax.Array:  # [E, T, N] -> [N]
+        return ~jnp.isfinite(numbers).all((0, 1))
+
+    observation = broken(trajectory.observation) | broken(trajectory.final_observation)
+    reward = broken(trajectory.reward)
     losses = (parameters, diagnostics.policy_loss, diagnostics.value_loss)
-    faults = jnp.stack([broken(observations), broken(trajectory.reward), broken(losses)])
-    return jnp.where(faults.any(), 1 + faults.argmax(), 0)
+    loss = jnp.stack([~jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(losses)])
+    faults = jnp.stack([observation.any(), reward.any(), loss.any()])
+    fault = jnp.where(faults.any(), 1 + faults.argmax(), 0)
+    return fault, jnp.where(observation.any(), observation.argmax(), reward.argmax())
 
 
 def _keep_first_fault(previous: Diagnostics, current: Diagnostics, iteration: jax.Array) -> Diagnostics:
@@ -326,5 +349,6 @@ def _keep_first_fault(previous: Diagnostics, current: Diagnostics, iteration: ja
     faulty = previous.fault > 0
     return current._replace(
         fault=jnp.where(faulty, previous.fault, current.fault),
+        fault_component=jnp.where(faulty, previous.fault_component, current.fault_component),
         fault_iteration=jnp.where(faulty, previous.fault_iteration, iteration),
     )

@@ -1,13 +1,15 @@
 """The population of one run: its keys, and whether its numbers are still finite."""
 
+import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import jax
 import numpy as np
 
-from envs.core import Environment
+from envs.core import Environment, Objective
 from jmorl.config import Config
-from jmorl.learning.moppo import FAULTS, Diagnostics, TrainState
+from jmorl.learning.moppo import Diagnostics, TrainState
 from jmorl.learning.programs import CompiledPrograms, Programs, schedule_of
 from jmorl.learning.rollout import EpisodeReturns
 
@@ -24,6 +26,7 @@ class Population:
 
     def __init__(self, environment: Environment[Any], config: Config, programs: Programs | None = None):
         self.size = config.population.agents
+        self.objectives = environment.objectives
         self.programs: Programs = programs or CompiledPrograms(environment, config)
 
     @property
@@ -50,27 +53,33 @@ class Population:
         keys = jax.random.split(key, self.size)
         schedule = schedule_of(iterations, learning_rate)
         train_states, diagnostics = self.programs.train(train_states, np.asarray(weights, np.float32), keys, schedule)
-        _raise_faults(diagnostics)
+        _raise_faults(diagnostics, self.objectives)
         return train_states, diagnostics
 
     def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
         """Returns [P, episodes, M] of every agent from the same keys [episodes], with traces for paper units.
 
-        Raises TrainingFault, naming the agents, if a return is not finite.
+        Raises TrainingFault, naming agents and objectives, if a return is not finite.
         """
         returns = self.programs.evaluate(train_states, keys)
-        faulty = np.flatnonzero(~np.isfinite(returns.undiscounted).all((1, 2)))
-        if len(faulty):
-            raise TrainingFault("; ".join(f"agent {agent}: a return is not finite in evaluation" for agent in faulty))
+        faulty = ~np.isfinite(returns.undiscounted).all(1)  # [P, M]
+        if faulty.any():
+            names = [objective.name for objective in self.objectives]
+            raise TrainingFault(
+                "; ".join(
+                    f"agent {agent}: the return of {', '.join(itertools.compress(names, faulty[agent]))} is not finite "
+                    "in evaluation"
+                    for agent in np.flatnonzero(faulty.any(1))
+                )
+            )
         return returns
 
 
-def _raise_faults(diagnostics: Diagnostics) -> None:
-    faulty = np.flatnonzero(diagnostics.fault)
-    if len(faulty):
-        lines = [
-            f"agent {agent}: {FAULTS[diagnostics.fault[agent]]} is not finite in iteration "
-            f"{diagnostics.fault_iteration[agent]}"
-            for agent in faulty
-        ]
-        raise TrainingFault("; ".join(lines))
+def _raise_faults(diagnostics: Diagnostics, objectives: Sequence[Objective]) -> None:
+    faults = [
+        f"agent {agent}: {diagnostics.cause(agent, objectives)} is not finite in iteration "
+        f"{diagnostics.fault_iteration[agent]}"
+        for agent in np.flatnonzero(diagnostics.fault).tolist()
+    ]
+    if faults:
+        raise TrainingFault("; ".join(faults))
