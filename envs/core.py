@@ -16,7 +16,9 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 import jax
 import jax.numpy as jnp
 from flax import struct
+from numpy.typing import ArrayLike
 
+from envs.actions import ActionBox, action_box
 from envs.drawing import NoDrawing, Scene
 
 PhysicsState = TypeVar("PhysicsState")
@@ -39,8 +41,8 @@ class Transition(NamedTuple):
     """What one application of the dynamics produced, before any time limit or reset."""
 
     state: Any  # the successor state
-    reward: jax.Array  # [M] float32, the environment's own units
-    terminated: jax.Array  # [] bool, the task itself ended
+    reward: jax.Array  # [M] the environment's own units; numbers of any kind, which become float32
+    terminated: jax.typing.ArrayLike  # [] bool, the task itself ended
 
 
 @struct.dataclass
@@ -69,7 +71,8 @@ class Step(NamedTuple):
 class Environment(ABC, Generic[PhysicsState]):
     """A multi-objective Markov decision process with continuous actions and a time limit.
 
-    Actions are boxes: every component in [`action_low`, `action_high`]; `transition` clips.
+    Every component of an action lies between `action_low` and `action_high`, in the environment's own units; both are
+    a number, or one for each component, and may be infinite. `action_box` is what follows from them.
     An instance holds no state and is hashable by identity, so it can be closed over by `jit`.
     """
 
@@ -77,10 +80,15 @@ class Environment(ABC, Generic[PhysicsState]):
     objectives: ClassVar[tuple[Objective, ...]]
     observation_size: ClassVar[int]
     action_size: ClassVar[int]
-    action_low: ClassVar[float] = -1.0
-    action_high: ClassVar[float] = 1.0
+    action_low: ArrayLike = -1.0  # [] or [A]
+    action_high: ArrayLike = 1.0  # [] or [A]
     time_limit: ClassVar[int]
     step_seconds: ClassVar[float | None] = None  # simulated time of a step, where steps have a duration
+
+    @property
+    def action_box(self) -> ActionBox:
+        """The bounds of every component, and how the output of a policy is mapped onto them. Raises ValueError."""
+        return action_box(self.action_low, self.action_high, int(self.action_size))
 
     @abstractmethod
     def initial_state(self, key: jax.Array) -> PhysicsState:
@@ -88,11 +96,11 @@ class Environment(ABC, Generic[PhysicsState]):
 
     @abstractmethod
     def observe(self, state: PhysicsState) -> jax.Array:  # [O]
-        """What the agent sees of a state."""
+        """What the agent sees of a state: numbers of any kind, which become float32."""
 
     @abstractmethod
     def transition(self, state: PhysicsState, action: jax.Array) -> Transition:
-        """The dynamics: state and action [A] to successor, vector reward and termination."""
+        """The dynamics: state and action [A] within the box to successor, vector reward and termination."""
 
     def scene(self, state: PhysicsState) -> Scene:
         """A state as a picture, on the host. Raises NoDrawing for an environment that has none."""
@@ -101,15 +109,17 @@ class Environment(ABC, Generic[PhysicsState]):
     def reset(self, key: jax.Array) -> tuple[EpisodeState[PhysicsState], jax.Array]:
         """Start an episode. Returns its state and first observation [O]."""
         physics = self.initial_state(key)
-        return EpisodeState(physics, jnp.zeros((), jnp.int32)), self.observe(physics)
+        return EpisodeState(physics, jnp.zeros((), jnp.int32)), _floats(self.observe(physics))
 
     def advance(self, state: EpisodeState[PhysicsState], action: jax.Array) -> tuple[EpisodeState[PhysicsState], Step]:
         """One step without reset: an ended episode stays at its final state. For evaluation and playback."""
         physics, reward, terminated = self.transition(state.physics, action)
+        terminated = jnp.asarray(terminated)
         elapsed_steps = state.elapsed_steps + 1
         truncated = (elapsed_steps >= self.time_limit) & ~terminated
-        observation = self.observe(physics)
-        return EpisodeState(physics, elapsed_steps), Step(observation, reward, terminated, truncated, observation)
+        observation = _floats(self.observe(physics))
+        step = Step(observation, _floats(reward), terminated, truncated, observation)
+        return EpisodeState(physics, elapsed_steps), step
 
     def step(
         self, key: jax.Array, state: EpisodeState[PhysicsState], action: jax.Array
@@ -120,3 +130,10 @@ class Environment(ABC, Generic[PhysicsState]):
         ended = step.terminated | step.truncated
         next_state = jax.tree.map(lambda new, old: jnp.where(ended, new, old), fresh, continued)
         return next_state, step._replace(observation=jnp.where(ended, first_observation, step.final_observation))
+
+
+def _floats(numbers: ArrayLike) -> jax.Array:
+    """Numbers as float32. Wider ones, which JAX has only if it was told so, stay."""
+    array = jnp.asarray(numbers)
+    wide = jnp.issubdtype(array.dtype, jnp.floating) and array.dtype.itemsize >= 4
+    return array.astype(array.dtype if wide else jnp.float32)

@@ -23,15 +23,9 @@ class GymnasiumEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
     metadata: dict[str, Any] = {"render_modes": []}
 
     def __init__(self, environment: Environment[Any]):
-        size, actions, objectives = (
-            environment.observation_size,
-            environment.action_size,
-            len(environment.objectives),
-        )
+        size, box, objectives = environment.observation_size, environment.action_box, len(environment.objectives)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        self.action_space = gymnasium.spaces.Box(
-            environment.action_low, environment.action_high, (actions,), np.float32
-        )
+        self.action_space = gymnasium.spaces.Box(box.low, box.high, dtype=np.float32)
         self.reward_space = gymnasium.spaces.Box(-np.inf, np.inf, (objectives,), np.float32)
         self.reward_dim = objectives
         self._reset = jax.jit(environment.reset)

@@ -80,7 +80,7 @@ class HalfCheetah(Environment[BodyState]):
         return jnp.concatenate([state.qpos[1:], state.qvel])
 
     def transition(self, state: BodyState, action: jax.Array) -> Transition:
-        control = jnp.clip(action, self.action_low, self.action_high)
+        control = jnp.clip(action, -1.0, 1.0)
         state, displacement = self.physics.advance(state, control, FRAME_SKIP)
         # Not from a difference of positions, which in float32 and 10 km away is wrong by 0.01 m/s and more.
         speed = displacement[0] / self.step_seconds

@@ -25,11 +25,8 @@ def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
     environment = policy_environment(policy.header["environment"])
     discount = policy.header["discount"]
 
-    def act(observation: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return policy.mean_action(observation, jnp), jnp.asarray(policy.log_std)
-
     def episode(key: jax.Array) -> EpisodeReturns:
-        return episode_returns(environment, act, key, discount)
+        return episode_returns(environment, lambda observation, _: policy.action(observation, jnp), key, discount)
 
     returns: EpisodeReturns = jax.device_get(jax.jit(jax.vmap(episode))(keys))
     return returns

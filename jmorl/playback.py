@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +12,8 @@ import numpy as np
 from envs.core import Environment
 from envs.drawing import Scene
 from jmorl.storage.policy_file import StoredPolicy, policy_environment
+
+CHUNK = 1000  # steps that are computed at once, at most
 
 
 class PlaybackError(ValueError):
@@ -42,37 +44,56 @@ def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) 
     """A deterministic episode from `key`'s start, to its end or for `most_steps`.
 
     With the same key it is the episode that `jmorl.evaluation.evaluate_stored` scores. Policies of one environment
-    share a compiled program. Raises PolicyFileError if that environment cannot be made here.
+    share compiled programs. Raises PolicyFileError if that environment cannot be made here.
     """
-    environment, episode = _program(policy.header["environment"], most_steps)
-    first, (states, rewards, endings) = jax.device_get(episode(_arrays(policy), key))
+    programs = _programs(policy.header["environment"], most_steps)
+    arrays = _arrays(policy)
+    episode = programs.start(key)
+    first = jax.device_get(episode[0].physics)
+    chunks = []
+    for _ in range(programs.chunks):  # not in one program: the time limit may be far beyond the end
+        episode, chunk = programs.go_on(arrays, episode)
+        chunks.append(jax.device_get(chunk))
+        if chunks[-1][2].any():
+            break
+    states, rewards, endings = jax.tree.map(lambda *parts: np.concatenate(parts)[: programs.length], *chunks)
     steps = int(np.argmax(endings)) + 1 if endings.any() else len(endings)
     states = jax.tree.map(lambda start, after: np.concatenate([start[None], after[:steps]]), first, states)
     totals = np.concatenate([np.zeros((1, rewards.shape[1])), np.cumsum(rewards[:steps], axis=0, dtype=np.float64)])
-    return Recording(environment, policy, states, totals)
+    return Recording(programs.environment, policy, states, totals)
+
+
+class _Programs(NamedTuple):
+    """An environment, and the episodes in it of policies given by their arrays."""
+
+    environment: Environment[Any]
+    length: int  # steps of an episode at most
+    chunks: int  # calls of `go_on` that this takes
+    start: Callable[..., Any]  # from a key to the state of the episode and the first observation
+    go_on: Callable[..., Any]  # from there, steps of a policy: where they lead, and what they went through
 
 
 @lru_cache(maxsize=4)
-def _program(environment_id: str, most_steps: int | None) -> tuple[Environment[Any], Callable[..., Any]]:
-    """An environment, and the episode in it of a policy given by its arrays, from the start of a key."""
+def _programs(environment_id: str, most_steps: int | None) -> _Programs:
+    """The programs for one environment, compiled when they are first called."""
     environment = policy_environment(environment_id)
-    length = min(most_steps or environment.time_limit, environment.time_limit)
+    length = int(min(most_steps or environment.time_limit, environment.time_limit))
+    chunks = -(-length // CHUNK)
 
     @jax.jit
-    def episode(arrays: dict[str, Any], key: jax.Array) -> tuple[Any, tuple[Any, jax.Array, jax.Array]]:
+    def go_on(arrays: dict[str, Any], episode: tuple[Any, jax.Array]) -> tuple[Any, tuple[Any, jax.Array, jax.Array]]:
         policy = StoredPolicy(log_std=np.empty(0), **arrays)
 
         def act(
             carry: tuple[Any, jax.Array], _: None
         ) -> tuple[tuple[Any, jax.Array], tuple[Any, jax.Array, jax.Array]]:
             state, observation = carry
-            state, step = environment.advance(state, policy.mean_action(observation, jnp))
+            state, step = environment.advance(state, policy.action(observation, jnp))
             return (state, step.observation), (state.physics, step.reward, step.terminated | step.truncated)
 
-        start = environment.reset(key)
-        return start[0].physics, jax.lax.scan(act, start, None, length=length)[1]
+        return jax.lax.scan(act, episode, None, length=-(-length // chunks))
 
-    return environment, episode
+    return _Programs(environment, length, chunks, jax.jit(environment.reset), go_on)
 
 
 def _arrays(policy: StoredPolicy) -> dict[str, Any]:
@@ -82,4 +103,5 @@ def _arrays(policy: StoredPolicy) -> dict[str, Any]:
         "layers": policy.layers,
         "observation_mean": policy.observation_mean,
         "observation_variance": policy.observation_variance,
+        "box": policy.box,
     }

@@ -83,6 +83,21 @@ class Clipped(Probe):
         return -jnp.full(2, (jnp.clip(action[0], -1.0, 1.0) - 0.5) ** 2)
 
 
+class Share(Probe):
+    """The action should be at three quarters of its box, whose bounds are options: does a policy know its units?"""
+
+    id = "probe-share"
+
+    def __init__(self, low="-1", high="1"):
+        self.action_low, self.action_high = float(low), float(high)
+
+    def share(self, action):
+        return (action[0] - self.action_low) / (self.action_high - self.action_low)
+
+    def reward(self, state, action):
+        return jnp.stack([-((self.share(action) - 0.75) ** 2), -0.1 * jnp.abs(self.share(action) - 0.75)])
+
+
 class Follow(Probe):
     """The action should equal the observation, drawn anew in each episode: does the policy look?"""
 

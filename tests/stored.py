@@ -16,7 +16,6 @@ def stored_linear_policy(path, environment_id: str, gain) -> StoredPolicy:
         "format": FORMAT,
         "environment": environment_id,
         "objectives": [vars(objective) for objective in environment.objectives],
-        "action_limits": [environment.action_low, environment.action_high],
         "id": 17,
         "values": [0.0] * len(environment.objectives),
         "discount": 0.9,
@@ -29,5 +28,6 @@ def stored_linear_policy(path, environment_id: str, gain) -> StoredPolicy:
         log_std=np.zeros(environment.action_size, np.float32),
         observation_mean=np.zeros(environment.observation_size, np.float32),
         observation_variance=np.ones(environment.observation_size, np.float32),
+        **{f"action_{name}": array for name, array in environment.action_box._asdict().items()},
     )
     return load_policy(path)

@@ -36,7 +36,11 @@ def clipped_value_loss(
     return 0.5 * squared_error.mean()
 
 
-def action_bound_loss(mean: jax.Array, low: float, high: float) -> jax.Array:  # [B, A] -> []
+def action_bound_loss(
+    mean: jax.Array,  # [B, A] normalised
+    low: jax.typing.ArrayLike,  # [] or [A] normalised, as `ActionBox.normalized_bounds`
+    high: jax.typing.ArrayLike,
+) -> jax.Array:  # []
     """The squared distance of the mean actions from the box [low, high], summed over A, mean over the batch.
 
     Beyond the box all samples do the same, so nothing else pulls a mean back that was driven there while the

@@ -55,7 +55,7 @@ class Batch(NamedTuple):
     """What one update learns from; minibatches are slices of its leading axis."""
 
     observation: jax.Array  # [B, O] normalised
-    action: jax.Array  # [B, A]
+    action: jax.Array  # [B, A] normalised
     log_probability: jax.Array  # [B]
     value: jax.Array  # [B, M] in reward-scaled units
     advantage: jax.Array  # [B] scalarised
@@ -283,7 +283,7 @@ class MOPPO:
         )
         value_loss = clipped_value_loss(values, batch.value, batch.returns, self.config.clip)
         entropy = gaussian_entropy(log_std)
-        bound_loss = action_bound_loss(mean, self.environment.action_low, self.environment.action_high)
+        bound_loss = action_bound_loss(mean, *self.environment.action_box.normalized_bounds)
         loss = (
             policy_loss
             + self.config.value_coefficient * value_loss
@@ -303,10 +303,16 @@ class MOPPO:
         self, train_state: TrainState, keys: jax.Array, sampled: bool = False, traced: bool = False
     ) -> EpisodeReturns:
         """One episode for each key [episodes], as `episode_returns`, with the agent's frozen statistics."""
-        policy = self.policy(train_state)
-        return jax.vmap(
-            lambda key: episode_returns(self.environment, policy, key, self.config.discount, sampled, traced)
-        )(keys)
+        policy, box = self.policy(train_state), self.environment.action_box
+
+        def act(observation: jax.Array, noise: jax.Array | None) -> jax.Array:
+            mean, log_std = policy(observation)
+            return box.action(mean if noise is None else mean + jnp.exp(log_std) * noise)
+
+        def episode(key: jax.Array) -> EpisodeReturns:
+            return episode_returns(self.environment, act, key, self.config.discount, sampled, traced)
+
+        return jax.vmap(episode)(keys)
 
 
 def _random_order(key: jax.Array, size: int) -> jax.Array:

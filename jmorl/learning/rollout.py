@@ -8,14 +8,19 @@ import jax.numpy as jnp
 
 from envs.core import Environment, EpisodeState
 
-PolicyFunction = Callable[[jax.Array], tuple[jax.Array, jax.Array]]  # observation [O] -> mean [A], log_std [A]
+# Observation [O] -> mean [A] and log_std [A] of the normalised action (`envs.actions`).
+PolicyFunction = Callable[[jax.Array], tuple[jax.Array, jax.Array]]
+# Observation [O] and standard normal noise [A], or None for the mean -> action [A] in the environment's own units.
+ActFunction = Callable[[jax.Array, jax.Array | None], jax.Array]
+
+CHUNK = 64  # steps at most, between two looks at whether every episode has ended
 
 
 class Trajectory(NamedTuple):
     """Steps of one environment. After `lax.scan` every field has a leading T axis."""
 
     observation: jax.Array  # [O] acted on
-    action: jax.Array  # [A] as sampled; the environment clips
+    action: jax.Array  # [A] normalised, as sampled
     reward: jax.Array  # [M] raw
     terminated: jax.Array  # [] bool
     truncated: jax.Array  # [] bool
@@ -35,6 +40,7 @@ def rollout(
     The noise of successive actions has this correlation; that of each action stays standard normal.
     Returns where to continue, and the trajectory [T, ...].
     """
+    box = environment.action_box
     noise_key, reset_key = jax.random.split(key)
     # Drawn outside the scan: one large draw is much cheaper than T small ones.
     noise = correlated_noise(noise_key, (steps, environment.action_size), noise_correlation)
@@ -47,7 +53,7 @@ def rollout(
         noise_t, key_t = randomness
         mean, log_std = policy(observation)
         action = mean + jnp.exp(log_std) * noise_t
-        state, step = environment.step(key_t, state, action)
+        state, step = environment.step(key_t, state, box.action(action))
         transition = Trajectory(
             observation, action, step.reward, step.terminated, step.truncated, step.final_observation
         )
@@ -89,9 +95,18 @@ class EpisodeReturns(NamedTuple):
     trace: Trace | None = None  # only if it was asked for
 
 
+class _Episode(NamedTuple):
+    """An episode under way, or at its end."""
+
+    state: EpisodeState[Any]
+    observation: jax.Array  # [O]
+    running: jax.Array  # [] bool
+    returns: EpisodeReturns  # so far
+
+
 def episode_returns(
     environment: Environment[Any],
-    policy: PolicyFunction,
+    act: ActFunction,
     key: jax.Array,
     discount: float,
     sampled: bool = False,
@@ -99,20 +114,17 @@ def episode_returns(
 ) -> EpisodeReturns:
     """One episode, its start drawn from `key`, to its end or the time limit.
 
-    Actions are the mean, or, if `sampled`, drawn from the policy. `traced`: every reward is kept. The scan always
-    runs to the time limit; what comes after the end is masked.
+    Actions are without noise unless `sampled`. `traced`: every reward is kept, which takes room for all steps up to
+    the time limit. What comes after the end is masked.
     """
     start_key, noise = key, None
     if sampled:
         start_key, noise_key = jax.random.split(key)
         noise = jax.random.normal(noise_key, (environment.time_limit, environment.action_size))
 
-    def act(
-        carry: tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], noise_t: jax.Array | None
-    ) -> tuple[tuple[EpisodeState[Any], jax.Array, jax.Array, EpisodeReturns], tuple[jax.Array, jax.Array] | None]:
-        state, observation, running, returns = carry
-        mean, log_std = policy(observation)
-        state, step = environment.advance(state, mean if noise_t is None else mean + jnp.exp(log_std) * noise_t)
+    def advance(episode: _Episode, noise_t: jax.Array | None) -> tuple[_Episode, Any]:
+        state, observation, running, returns = episode
+        state, step = environment.advance(state, act(observation, noise_t))
         # A weight of zero would let a NaN from beyond the end through; a where does not.
         reward = jnp.where(running, step.reward, 0.0)
         kept = (reward, running & step.terminated) if traced else None
@@ -121,14 +133,36 @@ def episode_returns(
             returns.discounted + discount**returns.length * reward,
             returns.length + running,
         )
-        running = running & ~(step.terminated | step.truncated)
-        return (state, step.observation, running, returns), kept
+        return _Episode(state, step.observation, running & ~(step.terminated | step.truncated), returns), kept
 
     state, observation = environment.reset(start_key)
     zeros = jnp.zeros(len(environment.objectives))
-    start = (state, observation, jnp.array(True), EpisodeReturns(zeros, zeros, jnp.array(0)))
-    (_, _, _, returns), kept = jax.lax.scan(act, start, noise, length=environment.time_limit)
-    if kept is None:
-        return returns
-    rewards, terminated = kept
-    return returns._replace(trace=Trace(rewards, terminated.any()))
+    start = _Episode(state, observation, jnp.array(True), EpisodeReturns(zeros, zeros, jnp.array(0)))
+    if not traced:
+        return _at_its_end(advance, start, noise, environment.time_limit).returns
+    episode, (rewards, terminated) = jax.lax.scan(advance, start, noise, length=environment.time_limit)
+    return episode.returns._replace(trace=Trace(rewards, terminated.any()))
+
+
+def _at_its_end(
+    advance: Callable[[_Episode, jax.Array | None], tuple[_Episode, Any]],
+    start: _Episode,
+    noise: jax.Array | None,  # [T, A]
+    time_limit: int,  # T
+) -> _Episode:
+    """Advance until the episode has ended, or, under `vmap`, until all have, whatever the time limit is.
+
+    Equal chunks of steps, or the question whether to go on would cost as much as a cheap step.
+    """
+    chunks = -(-time_limit // CHUNK)
+    steps = -(-time_limit // chunks)
+    if noise is not None:
+        padded = jnp.pad(noise, ((0, chunks * steps - time_limit), (0, 0)))
+        noise = padded.reshape(chunks, steps, -1)
+
+    def chunk(carry: tuple[jax.Array, _Episode]) -> tuple[jax.Array, _Episode]:
+        index, episode = carry
+        noise_of_chunk = None if noise is None else noise[index]
+        return index + 1, jax.lax.scan(advance, episode, noise_of_chunk, length=steps)[0]
+
+    return jax.lax.while_loop(lambda carry: carry[1].running, chunk, (jnp.array(0), start))[1]

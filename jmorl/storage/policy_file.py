@@ -1,8 +1,11 @@
 """A policy as one file: a NumPy archive with a JSON header, read without pickle and without JAX.
 
 The header names the environment, objectives with their units, mean undiscounted returns, the score the run went by and
-its spread, weights and origin, and says how the network is computed; the arrays are the actor's layers and the
-observation statistics. `load_policy(path)(observation)` is the deterministic action.
+its spread, weights and origin, and says how the network is computed; the arrays are the actor's layers, the
+observation statistics, and how the network's output is mapped onto the action box. `load_policy(path)(observation)` is
+the deterministic action.
+
+Format 1 had the action's limits in its header and only clipped to them.
 """
 
 import importlib.metadata
@@ -11,11 +14,13 @@ import shutil
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 import envs
+from envs.actions import ActionBox
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
@@ -23,7 +28,7 @@ from jmorl.search.policy import Policy
 from jmorl.storage.files import written_whole
 from jmorl.storage.versions import NewerFormat, check_format
 
-FORMAT = 1
+FORMAT = 2
 INPUT = {"variance_floor": VARIANCE_FLOOR, "clip": NORMALIZED_CLIP}
 
 
@@ -40,14 +45,19 @@ class StoredPolicy:
     log_std: np.ndarray  # [A]
     observation_mean: np.ndarray  # [O]
     observation_variance: np.ndarray  # [O]
+    box: ActionBox
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """The deterministic action, clipped to the environment's limits."""
-        low, high = self.header["action_limits"]
-        return np.clip(self.mean_action(np.asarray(observation, np.float32)), low, high)
+        """The deterministic action in the environment's own units, within its box."""
+        action: np.ndarray = self.action(np.asarray(observation, np.float32))
+        return action
 
-    def mean_action(self, observation: Any, xp: Any = np) -> Any:
-        """The unclipped mean action; `xp` may be `jax.numpy` to trace it."""
+    def action(self, observation: Any, xp: ModuleType = np) -> Any:
+        """The same; `xp` may be `jax.numpy` to trace it."""
+        return self.box.action(self._network(observation, xp), xp)
+
+    def _network(self, observation: Any, xp: ModuleType) -> Any:
+        """The mean of the normalised action."""
         floor, limit = self.header["network"]["variance_floor"], self.header["network"]["clip"]
         x = (observation - self.observation_mean) / xp.sqrt(self.observation_variance + floor)
         x = xp.clip(x, -limit, limit)
@@ -71,7 +81,6 @@ def save_policy(
         "jmorl": importlib.metadata.version("jmorl"),
         "environment": config.env,
         "objectives": [vars(objective) for objective in environment.objectives],
-        "action_limits": [environment.action_low, environment.action_high],
         "id": policy.id,
         "generation": policy.generation,
         "parent": policy.parent,
@@ -84,7 +93,7 @@ def save_policy(
         "discount": config.ppo.discount,
         "run": {"id": run, "config": config.digest(), "method": config.method, "seed": config.seed},
         "network": {
-            "sizes": [environment.observation_size, *config.ppo.hidden_sizes, environment.action_size],
+            "sizes": [int(environment.observation_size), *config.ppo.hidden_sizes, int(environment.action_size)],
             "activation": "tanh",
             **INPUT,
         },
@@ -95,6 +104,7 @@ def save_policy(
         "log_std": parameters["log_std"],
         "observation_mean": statistics.mean,
         "observation_variance": statistics.variance,
+        **{f"action_{name}": array for name, array in environment.action_box._asdict().items()},
     }
     for index, layer in enumerate(layers):
         arrays |= {f"layer_{index}_kernel": layer["kernel"], f"layer_{index}_bias": layer["bias"]}
@@ -128,13 +138,25 @@ def load_policy(path: Path | str) -> StoredPolicy:
         header.setdefault("network", INPUT)  # files of the first versions do not say
         count = sum(name.endswith("_kernel") for name in arrays)
         layers = tuple((arrays[f"layer_{i}_kernel"], arrays[f"layer_{i}_bias"]) for i in range(count))
+        box = _clipping_box(header, len(arrays["log_std"])) if header["format"] == 1 else _box(arrays)
         return StoredPolicy(
-            header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"]
+            header, layers, arrays["log_std"], arrays["observation_mean"], arrays["observation_variance"], box
         )
     except NewerFormat:
         raise
     except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as error:
         raise PolicyFileError(f"{path} is not a policy file: {error}") from error
+
+
+def _box(arrays: dict[str, np.ndarray]) -> ActionBox:
+    """How the network's output is mapped onto the action box."""
+    return ActionBox(*(arrays[f"action_{name}"] for name in ActionBox._fields))
+
+
+def _clipping_box(header: dict[str, Any], size: int) -> ActionBox:
+    """The same of a file of format 1."""
+    low, high = (np.full(size, limit, np.float32) for limit in header["action_limits"])
+    return ActionBox(low, high, np.zeros(size, np.float32), np.ones(size, np.float32))
 
 
 def policy_environment(environment_id: str) -> Environment[Any]:
