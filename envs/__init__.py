@@ -59,7 +59,7 @@ def make(id: str, **options: Any) -> Environment[Any]:
         environment = factory(**options)
     except ValueError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"environment {name!r} cannot be made: {failure(error)}") from error
     check_declaration(environment)
     return environment
@@ -78,7 +78,7 @@ def plain_id(id: str) -> str:
 def _import(id: str, module: str) -> None:
     try:
         importlib.import_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         said = str(error) if isinstance(error, ImportError) else failure(error)
         raise ValueError(f"environment {id!r}: cannot import {module!r}: {said}") from error
 
@@ -105,6 +105,10 @@ def _parts(id: str) -> tuple[str, str, dict[str, str]]:
     pairs = [option.partition("=") for option in options]
     if not all(option and equals for option, equals, _ in pairs):
         raise ValueError(f"environment {id!r}: an option is written name=value, after a comma")
+    names = [option for option, _, _ in pairs]
+    twice = [option for option in dict.fromkeys(names) if names.count(option) > 1]
+    if twice:
+        raise ValueError(f"environment {id!r}: option {', '.join(twice)} is given more than once")
     return module, plain_id(id), {option: value for option, _, value in pairs}
 
 

@@ -1,17 +1,21 @@
 """Whether an environment is what it says it is, found out before anything is computed with it."""
 
+from collections.abc import Iterator
 from numbers import Integral
 from typing import Any
 from weakref import WeakValueDictionary
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from envs.core import Environment, Objective
+from envs.core import Environment, Objective, Transition
 from envs.failures import failure
+from envs.tracing import Traced, kept_tracers, traced
 
 COUNTS = ("observation_size", "action_size", "time_limit")
 FEWEST_OBJECTIVES = 2
+MOST = np.iinfo(np.int32).max  # what steps are counted with
 
 _checked: WeakValueDictionary[int, Environment[Any]] = WeakValueDictionary()  # by `id`: tracing takes a while
 
@@ -22,46 +26,135 @@ class NotAsDeclared(ValueError):
 
 def check_declaration(environment: Environment[Any]) -> None:
     """Raise NotAsDeclared unless an environment says of itself what it has to. Traces nothing."""
-    counts = {name: getattr(environment, name, None) for name in COUNTS}
-    wrong = [
-        f"{name} is {count!r}, not a whole number above zero"
-        for name, count in counts.items()
-        if not isinstance(count, Integral) or count < 1
-    ]
-    objectives = tuple(getattr(environment, "objectives", ()))
-    if len(objectives) < FEWEST_OBJECTIVES:
-        wrong.append(f"there must be {FEWEST_OBJECTIVES} objectives or more, not {len(objectives)}")
-    if not all(isinstance(objective, Objective) for objective in objectives):
-        wrong.append("objectives are not all of the kind envs.Objective")
-    elif len({objective.name for objective in objectives}) < len(objectives):
-        wrong.append("two objectives have the same name")
+    wrong = [*_wrong_counts(environment), *_wrong_objectives(environment)]
+    if not any(problem.startswith("action_size") for problem in wrong):
+        wrong += _wrong_bounds(environment)
     if wrong:
-        raise NotAsDeclared(f"environment {_name(environment)} declares what cannot be: {'; '.join(wrong)}")
+        raise NotAsDeclared(f"environment {name_of(environment)} declares what cannot be: {'; '.join(wrong)}")
 
 
-def check_environment(environment: Environment[Any]) -> None:
-    """Raise NotAsDeclared unless a reset and a step, traced and not computed, give what an environment declares."""
+def check_environment(environment: Environment[Any], again: Environment[Any] | None = None) -> None:
+    """Raise NotAsDeclared unless an environment's functions are pure and give what it declares.
+
+    They are traced, twice each, and not computed; if the environment is given as it is when it is made `again`, those
+    of that one must be the same.
+    """
     if _checked.get(id(environment)) is environment:
         return
     check_declaration(environment)
-    try:
-        start, observation = jax.eval_shape(environment.reset, jax.eval_shape(lambda: jax.random.key(0)))
-        action = jax.ShapeDtypeStruct((environment.action_size,), np.float32)
-        after, reward, terminated = jax.eval_shape(environment.transition, start.physics, action)
-        shapes = {
-            "observation": (observation.shape, (environment.observation_size,)),
-            "reward": (reward.shape, (len(environment.objectives),)),
-            "terminated": (terminated.shape, ()),
-        }
-    except Exception as error:
-        raise NotAsDeclared(f"environment {_name(environment)} breaks down: {failure(error)}") from error
-    wrong = [f"{name} has shape {real}, not {said}" for name, (real, said) in shapes.items() if real != said]
-    if terminated.dtype != bool:
-        wrong.append(f"terminated is {terminated.dtype}, not bool")
-    wrong += _changes(start.physics, after)
+    start = _result(environment, again, "initial_state", jax.eval_shape(lambda: jax.random.key(0)))
+    observation = _result(environment, again, "observe", start)
+    action = jax.ShapeDtypeStruct((environment.action_size,), np.float32)
+    transition = _result(environment, again, "transition", start, action)
+    wrong = list(_wrong_array("observation", observation, int(environment.observation_size), "concatenate its parts"))
+    if not isinstance(transition, tuple) or len(transition) != len(Transition._fields):
+        wrong.append(f"transition gives {_kind(transition)}, not Transition(state, reward, terminated)")
+    else:
+        after, reward, terminated = transition
+        wrong += _wrong_array("reward", reward, len(environment.objectives), "stack the objectives")
+        wrong += _wrong_terminated(terminated)
+        wrong += _changes(start, after)
     if wrong:
-        raise NotAsDeclared(f"environment {_name(environment)} is not as it declares: {'; '.join(wrong)}")
+        raise NotAsDeclared(f"environment {name_of(environment)} is not as it declares: {'; '.join(wrong)}")
     _checked[id(environment)] = environment
+
+
+def name_of(environment: Environment[Any]) -> str:
+    """Its id, or, if it has none, that of its class."""
+    return str(getattr(environment, "id", type(environment).__name__))
+
+
+def _wrong_counts(environment: Environment[Any]) -> Iterator[str]:
+    for name in COUNTS:
+        count = getattr(environment, name, None)
+        if not isinstance(count, Integral) or isinstance(count, bool) or int(count) < 1:
+            yield f"{name} is {count!r}, not a whole number above zero"
+        elif int(count) > MOST:
+            yield f"{name} is {count}, more than {MOST}"
+
+
+def _wrong_objectives(environment: Environment[Any]) -> Iterator[str]:
+    objectives = getattr(environment, "objectives", ())
+    if not isinstance(objectives, tuple | list):
+        yield f"objectives are {objectives!r}, not a tuple"
+        return
+    if len(objectives) < FEWEST_OBJECTIVES:
+        yield f"there must be {FEWEST_OBJECTIVES} objectives or more, not {len(objectives)}"
+    if not all(isinstance(objective, Objective) for objective in objectives):
+        yield "objectives are not all of the kind envs.Objective"
+        return
+    if not all(isinstance(text, str) for objective in objectives for text in vars(objective).values()):
+        yield "the name, label and unit of an objective are not all texts"
+    if len({objective.name for objective in objectives}) < len(objectives):
+        yield "two objectives have the same name"
+
+
+def _wrong_bounds(environment: Environment[Any]) -> Iterator[str]:
+    try:
+        _ = environment.action_box
+    except ValueError as error:
+        yield str(error)
+
+
+def _result(environment: Environment[Any], again: Environment[Any] | None, name: str, *arguments: Any) -> Any:
+    """What a function of the environment gives, with a jax.ShapeDtypeStruct for each array; raises NotAsDeclared."""
+    first = _trace(environment, name, *arguments)
+    if not first.same_program(_trace(environment, name, *arguments)):
+        raise NotAsDeclared(
+            f"environment {name_of(environment)} is not pure: {name} is another function each time it is called; "
+            "randomness comes from `key`, and what changes from step to step from `state`"
+        )
+    if again and not first.same_program(_trace(again, name, *arguments)):
+        raise NotAsDeclared(
+            f"environment {name_of(environment)} is another one each time it is made: {name} differs; what __init__ "
+            "draws comes from a seed that is always the same, or is an option"
+        )
+    return first.result
+
+
+def _trace(environment: Environment[Any], name: str, *arguments: Any) -> Traced:
+    """A function of the environment, traced. Raises NotAsDeclared for one that raises, or that remembers a trace."""
+    try:
+        result = traced(getattr(environment, name), *arguments)
+    except (Exception, SystemExit) as error:
+        raise NotAsDeclared(f"environment {name_of(environment)} breaks down: {failure(error)}") from error
+    kept = kept_tracers(environment)
+    if kept:
+        raise NotAsDeclared(
+            f"environment {name_of(environment)} is not pure: {name} keeps a number in self.{kept[0]}; what an episode "
+            "remembers belongs in `state`, what never changes is made in __init__, and randomness comes from `key`"
+        )
+    return result
+
+
+def _wrong_array(name: str, found: Any, size: int, advice: str) -> Iterator[str]:
+    """What keeps a result from being a vector of `size` real numbers of any kind."""
+    if not isinstance(found, jax.ShapeDtypeStruct):
+        yield f"{name} is {_kind(found)}, not one array of shape {(size,)}: {advice}"
+        return
+    if found.shape != (size,):
+        yield f"{name} has shape {found.shape}, not {(size,)}"
+    if not any(jnp.issubdtype(found.dtype, kind) for kind in (np.floating, np.integer, np.bool_)):
+        yield f"{name} is {found.dtype}, not real numbers"
+
+
+def _wrong_terminated(found: Any) -> Iterator[str]:
+    if not isinstance(found, jax.ShapeDtypeStruct):
+        yield f"terminated is {_kind(found)}, not True or False"
+        return
+    if found.shape != ():
+        yield f"terminated has shape {found.shape}, not ()"
+    if found.dtype != bool:
+        yield f"terminated is {found.dtype}, not bool"
+
+
+def _kind(found: Any) -> str:
+    """What something is that is no array, or not one alone."""
+    if isinstance(found, jax.ShapeDtypeStruct):
+        return "an array"
+    if isinstance(found, tuple | list):
+        return f"a {type(found).__name__} of {len(found)}"
+    return "None" if found is None else f"a {type(found).__name__}"
 
 
 def _changes(start: Any, after: Any) -> list[str]:
@@ -76,7 +169,3 @@ def _changes(start: Any, after: Any) -> list[str]:
         if before.dtype != now.dtype and not before.weak_type:
             changes.append(f"{name} is {now.dtype} after a step, not {before.dtype}")
     return changes
-
-
-def _name(environment: Environment[Any]) -> str:
-    return getattr(environment, "id", type(environment).__name__)
