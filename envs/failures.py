@@ -26,7 +26,8 @@ def failure(error: BaseException) -> str:
     own = [frame for frame in frames if not frame.filename.startswith(("<", *LIBRARIES))]
     place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
     advice = next((f"; {text}" for kind, text in ADVICE.items() if isinstance(error, kind)), "")
-    return f"{type(error).__name__}: {_message(error)}{advice}{place}"
+    said = ": ".join(filter(None, (type(error).__name__, _message(error))))
+    return said + advice + place
 
 
 def _message(error: BaseException) -> str:

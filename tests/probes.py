@@ -83,6 +83,21 @@ class Clipped(Probe):
         return -jnp.full(2, (jnp.clip(action[0], -1.0, 1.0) - 0.5) ** 2)
 
 
+class Share(Probe):
+    """The action should be at three quarters of its box, whose bounds are options: does a policy know its units?"""
+
+    id = "probe-share"
+
+    def __init__(self, low="-1", high="1"):
+        self.action_low, self.action_high = float(low), float(high)
+
+    def share(self, action):
+        return (action[0] - self.action_low) / (self.action_high - self.action_low)
+
+    def reward(self, state, action):
+        return jnp.stack([-((self.share(action) - 0.75) ** 2), -0.1 * jnp.abs(self.share(action) - 0.75)])
+
+
 class Follow(Probe):
     """The action should equal the observation, drawn anew in each episode: does the policy look?"""
 
@@ -114,24 +129,54 @@ class ThreeWays(Probe):
         return Transition(after, -distances, jnp.array(False))
 
 
-class Faulty(ThreeWays):
-    """Breaks in one way in the step in which an episode passes `breaks_at`."""
+class UnevenBox(ThreeWays):
+    """A component that is far from -1..1, and one that is open on a side."""
 
-    def __init__(self, where, breaks_at=5, value=jnp.nan):
-        self.where, self.breaks_at, self.value = where, breaks_at, value
+    id = "probe-uneven-box"
+    action_low: ClassVar = (5.0, -0.5)
+    action_high: ClassVar = (35.0, float("inf"))
+
+    def transition(self, state, action):
+        return super().transition(state, (action - jnp.array([20.0, 0.0])) / jnp.array([15.0, 1.0]))
+
+
+class Ending(Probe):
+    """Ends by itself after a number of steps that is drawn at the start, or at a limit that may be far away."""
+
+    id = "probe-ending"
+
+    def __init__(self, limit="10", most="40"):
+        self.time_limit, self.most = int(limit), int(most)
+
+    def initial_state(self, key):
+        return jnp.stack([jnp.zeros((), jnp.int32), jax.random.randint(key, (), 1, self.most + 1)])
+
+    def observe(self, state):
+        return state[:1] / self.most
+
+    def transition(self, state, action):
+        after = state + jnp.array([1, 0])
+        return Transition(after, jnp.stack([action[0], 1.0 + 0.1 * action[0]]), after[0] >= after[1])
+
+
+class Faulty(ThreeWays):
+    """Breaks in one component, or in all, in the step in which an episode passes `breaks_at`."""
+
+    def __init__(self, where, breaks_at=5, value=jnp.nan, component=slice(None)):
+        self.where, self.breaks_at, self.value, self.component = where, breaks_at, value, component
 
     def initial_state(self, key):
         return jnp.concatenate([super().initial_state(key), jnp.zeros(1)])
 
     def observe(self, state):
         broken = (state[2] >= self.breaks_at) & (self.where == "observation")
-        return jnp.where(broken, self.value, state[:2])
+        return jnp.where(broken, state[:2].at[self.component].set(self.value), state[:2])
 
     def transition(self, state, action):
         result = super().transition(state[:2], action)
         steps = state[2] + 1
         broken = (steps >= self.breaks_at) & (self.where == "reward")
-        reward = jnp.where(broken, self.value, result.reward)
+        reward = jnp.where(broken, result.reward.at[self.component].set(self.value), result.reward)
         return Transition(jnp.concatenate([result.state, steps[None]]), reward, result.terminated)
 
 

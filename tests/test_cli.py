@@ -302,7 +302,7 @@ def test_numbers_that_stop_being_finite_end_the_run_and_reach_no_file(tmp_path, 
     assert main(arguments) == 1
     printed = capsys.readouterr()
     # The seventh step of an episode falls into the second rollout of four steps.
-    faults = [f"agent {agent}: reward is not finite in iteration 2" for agent in range(2)]
+    faults = [f"agent {agent}: reward of left is not finite in iteration 2" for agent in range(2)]
     assert printed.err == f"jmorl: stopped: {'; '.join(faults)}\n"
     warm_up = json.loads(printed.out.splitlines()[1])
     assert (warm_up["event"], warm_up["generation"]) == ("generation", 0)

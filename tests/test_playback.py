@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import envs
 from envs.mountain_car import CarState
 from jmorl.cli import main
 from jmorl.evaluation import evaluate_stored
 from jmorl.playback import record
-from tests.probes import ThreeWays
+from tests.probes import Ending, Share, ThreeWays
 from tests.stored import stored_linear_policy
 
 CAR = "mo-mountaincarcontinuous-v0"
@@ -61,6 +62,34 @@ def test_a_recording_may_stop_before_the_end(policy):
     whole, part = record(policy, first_key(2)), record(policy, first_key(2), 10)
     assert part.steps == 10
     np.testing.assert_allclose(part.totals, whole.totals[:11], rtol=1e-5)
+
+
+@pytest.fixture
+def ending(monkeypatch, tmp_path):
+    """A policy where episodes end after 1 to 2500 steps, and the limit is too far to be computed."""
+    monkeypatch.setitem(envs._registry, Ending.id, Ending)
+    return stored_linear_policy(tmp_path / "ending.npz", f"{Ending.id},limit=2000000000,most=2500", [[0.5]])
+
+
+def test_a_recording_ends_with_its_episode_however_far_the_limit_is(ending):
+    returns = evaluate_stored(ending, jax.random.split(jax.random.key(0), 8))
+    assert returns.length.min() < 1000 < 2000 < returns.length.max()
+    for index, key in enumerate(jax.random.split(jax.random.key(0), 8)):
+        recording = record(ending, key)
+        assert recording.steps == returns.length[index]
+        np.testing.assert_allclose(recording.totals[-1], returns.undiscounted[index], rtol=1e-4)
+        np.testing.assert_array_equal(recording.states[:, 0], np.arange(recording.steps + 1))
+    longest = jax.random.split(jax.random.key(0), 8)[int(returns.length.argmax())]
+    assert record(ending, longest, 1500).steps == 1500
+
+
+def test_recording_and_score_use_the_policys_own_box(monkeypatch, tmp_path):
+    monkeypatch.setitem(envs._registry, Share.id, Share)
+    policy = stored_linear_policy(tmp_path / "share.npz", f"{Share.id},low=5,high=35", [[0.0]])
+    assert policy([0.0]) == 20
+    expected = [-(0.25**2), -0.025]  # the middle, for one step
+    np.testing.assert_allclose(record(policy, first_key(0)).totals[-1], expected, rtol=1e-5)
+    np.testing.assert_allclose(evaluate_stored(policy, first_key(0)[None]).undiscounted, [expected], rtol=1e-5)
 
 
 def test_play_makes_an_animation_with_a_picture_for_each_step(policy_path, tmp_path, capsys):

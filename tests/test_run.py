@@ -206,8 +206,8 @@ def test_what_was_found_before_a_fault_is_kept(small_config, monkeypatch):
 def test_a_fault_that_only_evaluation_meets_is_named(small_config):
     """Rollouts of four, twice, end before the tenth step of an episode, which breaks."""
     config = small_config.replace(ppo={"rollout_steps": 4, "minibatches": 2}, steps=4 * 3 * 4 * 11)
-    with pytest.raises(TrainingFault, match="agent 0: a return is not finite in evaluation; agent 1"):
-        list(run(config, Recorder(), Faulty("reward", breaks_at=10)))
+    with pytest.raises(TrainingFault, match="agent 0: the return of east, west is not finite in evaluation; agent 1"):
+        list(run(config, Recorder(), Faulty("reward", breaks_at=10, component=slice(1, None))))
 
 
 def test_an_environment_that_is_not_as_it_declares_is_refused(small_config):

@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 import envs
 from envs.gymnasium import GymnasiumEnvironment
+from tests.probes import UnevenBox
 
 
 class Scalarized(gymnasium.RewardWrapper):
@@ -52,3 +53,10 @@ def test_an_episode_is_the_environments_own(name):
 def test_a_step_before_the_first_reset_is_refused():
     with pytest.raises(ResetNeeded):
         GymnasiumEnvironment(envs.make(envs.ids()[0])).step(np.zeros(1))
+
+
+def test_the_action_space_is_the_box():
+    space = GymnasiumEnvironment(UnevenBox()).action_space
+    np.testing.assert_array_equal(space.low, np.float32([5, -0.5]))
+    np.testing.assert_array_equal(space.high, np.float32([35, np.inf]))
+    assert space.dtype == np.float32

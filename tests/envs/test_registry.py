@@ -32,6 +32,8 @@ def test_a_module_that_is_not_there_is_named():
         ("mo-halfcheetah-v5,physics", "an option is written name=value"),
         ("mo-halfcheetah-v5,=mjx", "an option is written name=value"),
         ("mo-halfcheetah-v5,", "an option is written name=value"),
+        ("mo-halfcheetah-v5,physics=planar,physics=mjx", "option physics is given more than once"),
+        ("mo-halfcheetah-v5,physics=planar,physics=planar", "option physics is given more than once"),
     ],
 )
 def test_an_option_that_is_not_there_or_not_written_so_is_refused(id, message):
@@ -46,6 +48,8 @@ def test_an_option_that_is_not_there_or_not_written_so_is_refused(id, message):
         ("def (:", r"SyntaxError: .*\(broken_envs.py, line 1\)$"),
         ("import numpy\nnumpy.zeros(-1)", r"ValueError: .*\(broken_envs.py, line 2\)$"),
         ("import no_such_module", "No module named 'no_such_module'$"),
+        ("import sys\nsys.exit(0)", r"SystemExit: 0; it ends the program \(broken_envs.py, line 2\)$"),
+        ("raise SystemExit", r"SystemExit; it ends the program \(broken_envs.py, line 1\)$"),
     ],
 )
 def test_a_module_that_breaks_down_is_named_with_the_line(tmp_path, monkeypatch, source, message):
@@ -75,6 +79,12 @@ def test_an_environment_that_cannot_be_made_is_named(monkeypatch):
     monkeypatch.setattr(envs, "_registry", {"unfinished": Unfinished})
     with pytest.raises(ValueError, match="environment 'unfinished' cannot be made: TypeError: .*abstract.*transition"):
         envs.make("unfinished")
+
+
+def test_an_environment_that_ends_the_program_when_it_is_made_is_named(monkeypatch):
+    monkeypatch.setattr(envs, "_registry", {"ending": lambda: sys.exit("no licence")})
+    with pytest.raises(ValueError, match="environment 'ending' cannot be made: SystemExit: no licence; it ends the"):
+        envs.make("ending")
 
 
 def test_options_reach_the_factory_from_the_id_and_from_the_call(monkeypatch):

@@ -11,7 +11,7 @@ from jmorl.learning.moppo import MOPPO, Schedule, _random_order
 from jmorl.learning.returns import discounted_sums
 from jmorl.learning.rollout import correlated_noise
 from jmorl.learning.statistics import normalize, return_scale
-from tests.probes import Clipped, Compromise, Endless, Follow, OneStep, Onwards, ThreeWays, TwoSteps
+from tests.probes import Clipped, Compromise, Ending, Endless, Follow, OneStep, Onwards, Share, ThreeWays, TwoSteps
 
 QUICK = {"environments": 8, "rollout_steps": 32, "minibatches": 4, "learning_rate": 3e-3, "discount": 0.9}
 
@@ -168,14 +168,39 @@ def test_the_policy_depends_on_the_observation():
     np.testing.assert_allclose(mean, observations, atol=0.2)
 
 
+@pytest.mark.parametrize(("low", "high"), [(-1, 1), (5, 35), (0, 1), (0, 1000), (-0.001, 0.001)])
+def test_a_policy_finds_its_place_in_whatever_box(low, high):
+    environment = Share(low, high)
+    moppo, train_state = learned(environment, initial_log_std=-1.0)
+    mean, _ = moppo.policy(train_state)(jnp.zeros(1))
+    assert mean[0] == pytest.approx(0.5, abs=0.1)  # normalised
+    assert environment.share(environment.action_box.action(mean)) == pytest.approx(0.75, abs=0.05)
+    returns = moppo.evaluate(train_state, jax.random.split(jax.random.key(0), 2))
+    np.testing.assert_allclose(returns.undiscounted[:, 0], 0, atol=0.05**2)
+
+
+def test_rollouts_keep_the_normalised_action_and_give_the_environment_its_own():
+    environment, config = Share(5, 35), PPOConfig(environments=2, rollout_steps=50, minibatches=1)
+    moppo = MOPPO(environment, config)
+    train_state = moppo.initial_train_state(jax.random.key(0))
+    rollout_state = moppo.initial_rollout_state(jax.random.key(1))
+    _, trajectory, _ = moppo.collect(train_state, rollout_state, jax.random.key(2))
+    assert jnp.abs(trajectory.action).max() > 1.5  # as sampled, beyond the box
+    share = jnp.clip(trajectory.action[..., 0], -1, 1) / 2 + 0.5
+    np.testing.assert_allclose(trajectory.reward[..., 0], -((share - 0.75) ** 2), atol=1e-6)
+
+
 def test_the_bound_loss_is_the_squared_distance_from_the_box():
     means = jnp.array([[0.5, -1.0], [3.0, -2.5], [1.0, 4.0]])
     assert action_bound_loss(means, -1.0, 2.0) == pytest.approx((0 + (1 + 1.5**2) + 2**2) / 3)
+    low, high = np.array([-1, -np.inf]), np.array([1, np.inf])
+    assert action_bound_loss(means, low, high) == pytest.approx((0 + 2**2 + 0) / 3)
 
 
+@pytest.mark.parametrize("environment", [Clipped(), Share(5, 35)], ids=["clipped", "scaled"])
 @pytest.mark.parametrize(("coefficient", "returns"), [(0.0, False), (1.0, True)])
-def test_only_the_bound_loss_brings_back_a_mean_far_outside_the_box(coefficient, returns):
-    moppo = MOPPO(Clipped(), PPOConfig(**QUICK, initial_log_std=-1.0, action_bound_coefficient=coefficient))
+def test_only_the_bound_loss_brings_back_a_mean_far_outside_the_box(environment, coefficient, returns):
+    moppo = MOPPO(environment, PPOConfig(**QUICK, initial_log_std=-1.0, action_bound_coefficient=coefficient))
     train_state = moppo.initial_train_state(jax.random.key(0))
     train_state.parameters["actor"]["params"]["MLP_0"]["Dense_2"]["bias"] += 3.0
     schedule = Schedule(40, moppo.config.learning_rate)
@@ -192,3 +217,33 @@ def test_evaluation_counts_an_episode_once_to_its_end():
     np.testing.assert_array_equal(returns.length, [2, 2, 2])
     endless = MOPPO(Endless(), PPOConfig(**QUICK)).evaluate(train_state, jax.random.split(jax.random.key(0), 3))
     np.testing.assert_array_equal(endless.length, [10, 10, 10])
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize("limit", [1, 3, 64, 65, 150])
+def test_evaluation_to_the_end_is_that_of_every_step_up_to_the_limit(limit, sampled):
+    """Episodes end after 1 to 200 steps, or at the limit, which the chunks of an evaluation do not divide."""
+    moppo = MOPPO(Ending(limit, 200), PPOConfig(**QUICK))
+    train_state, keys = moppo.initial_train_state(jax.random.key(0)), jax.random.split(jax.random.key(1), 16)
+    stopping, whole = (
+        jax.jit(lambda train_state, keys, traced=traced: moppo.evaluate(train_state, keys, sampled, traced))(
+            train_state, keys
+        )
+        for traced in (False, True)
+    )
+    starts = jax.vmap(moppo.environment.initial_state)(jax.vmap(_start_key)(keys) if sampled else keys)
+    np.testing.assert_array_equal(stopping.length, np.minimum(starts[:, 1], limit))
+    np.testing.assert_array_equal(whole.length, stopping.length)
+    np.testing.assert_allclose(stopping.undiscounted, whole.undiscounted, rtol=1e-6)
+    np.testing.assert_allclose(stopping.discounted, whole.discounted, rtol=1e-6)
+    np.testing.assert_allclose(whole.trace.rewards.sum(1), whole.undiscounted, rtol=1e-5, atol=1e-4)
+
+
+def _start_key(key):
+    return jax.random.split(key)[0]
+
+
+def test_evaluation_does_not_wait_for_a_limit_that_no_episode_reaches():
+    moppo = MOPPO(Ending(2**31 - 1, 40), PPOConfig(**QUICK))
+    returns = moppo.evaluate(moppo.initial_train_state(jax.random.key(0)), jax.random.split(jax.random.key(1), 8))
+    assert 1 <= returns.length.min() < returns.length.max() <= 40

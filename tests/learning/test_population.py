@@ -155,14 +155,22 @@ def test_devices_divide_the_population(agents, available, expected):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize("where", ["observation", "reward"])
-def test_numbers_that_are_not_finite_are_found_in_their_iteration_and_named(where, value):
+@pytest.mark.parametrize(
+    ("where", "component", "name"),
+    [
+        ("observation", slice(None), r"observation\[0\]"),
+        ("observation", 1, r"observation\[1\]"),
+        ("reward", slice(1, None), "reward of east"),
+        ("reward", 2, "reward of west"),
+    ],
+)
+def test_numbers_that_are_not_finite_are_found_in_their_iteration_and_named(where, component, name, value):
     # Episodes of ten steps and rollouts of four: the seventh step of an episode falls into the second rollout.
     config = CONFIG.replace(ppo={"rollout_steps": 4, "environments": 2, "minibatches": 2})
-    population = compiled(Faulty(where, breaks_at=7, value=value), config)
+    population = compiled(Faulty(where, breaks_at=7, value=value, component=component), config)
     start = population.initialize(jax.random.key(0))
     population.train(start, WEIGHTS, jax.random.key(1), 1, RATE)
-    with pytest.raises(TrainingFault, match=f"agent 0: {where} is not finite in iteration 2; agent 1") as error:
+    with pytest.raises(TrainingFault, match=f"agent 0: {name} is not finite in iteration 2; agent 1") as error:
         population.train(start, WEIGHTS, jax.random.key(1), 3, RATE)
     assert str(error.value).count("agent") == 4
 

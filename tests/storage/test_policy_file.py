@@ -14,11 +14,18 @@ from jmorl.learning.moppo import MOPPO
 from jmorl.storage import files
 from jmorl.storage.policy_file import FORMAT, PolicyFileError, export_policy, holds, load_policy, save_policy
 from jmorl.storage.versions import NewerFormat
+from tests.probes import ThreeWays, UnevenBox
+
+STORED = Path(__file__).parent / "format_1"
 
 
 @pytest.fixture
 def saved(make_policy, environment, small_config, tmp_path):
     """A run folder with one policy that is also its choice, and the train state in it."""
+    return saved_in(environment, make_policy, small_config, tmp_path)
+
+
+def saved_in(environment, make_policy, small_config, tmp_path):
     policy = make_policy(17)
     (tmp_path / "run" / "policies").mkdir(parents=True)
     train_state = MOPPO(environment, small_config.ppo).initial_train_state(jax.random.key(3))
@@ -52,8 +59,9 @@ def test_the_header_says_what_the_policy_is(saved, environment, small_config):
     assert header["format"] == FORMAT and header["jmorl"]
 
 
-def test_the_readmes_lines_act_as_the_policy_does_with_numpy_alone(saved, environment, small_config, tmp_path):
-    folder, policy = saved
+@pytest.mark.parametrize("boxed", [ThreeWays(), UnevenBox()], ids=["unit", "uneven"])
+def test_the_readmes_lines_act_as_the_policy_does_with_numpy_alone(boxed, make_policy, small_config, tmp_path):
+    folder, policy = saved_in(boxed, make_policy, small_config, tmp_path)
     readme = Path(__file__).parents[2].joinpath("README.md").read_text()
     lines = re.search(r"```python\n(import json.*?policy\.npz.*?)```", readme, re.DOTALL)[1]
     export_policy(folder, None, tmp_path / "policy.npz")
@@ -64,10 +72,12 @@ def test_the_readmes_lines_act_as_the_policy_does_with_numpy_alone(saved, enviro
         [sys.executable, "-I", "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
     ).stdout
     actions = np.array([json.loads(line) for line in printed.splitlines()])
-    acting = MOPPO(environment, small_config.ppo).policy(policy.snapshot)
-    expected = np.array([np.clip(acting(each.astype(np.float32))[0], -1, 1) for each in observations])
-    np.testing.assert_allclose(actions, expected, atol=1e-5)
-    np.testing.assert_allclose(load_policy(folder / "chosen.npz")(observations), expected, atol=1e-5)
+    acting = MOPPO(boxed, small_config.ppo).policy(policy.snapshot)
+    means = np.array([acting(each.astype(np.float32))[0] for each in observations])
+    middle, half_width = ([0, 0], [1, 1]) if type(boxed) is ThreeWays else ([20, 0], [15, 1])
+    expected = np.clip(middle + half_width * means, boxed.action_low, boxed.action_high)
+    np.testing.assert_allclose(actions, expected, atol=1e-4)
+    np.testing.assert_allclose(load_policy(folder / "chosen.npz")(observations), expected, atol=1e-4)
     assert np.ptp(expected, axis=0).min() > 1e-3
 
 
@@ -161,7 +171,7 @@ def test_a_file_of_the_first_version_has_its_deviation_by_todays_name(saved):
         (lambda header: header.pop("environment"), "environment is missing"),
         (lambda header: header.update(id="17", values=None), "id: input should be a valid integer; values: "),
         (lambda header: header.update(values=[1.0]), "1 values for 3 objectives"),
-        (lambda header: header.update(action_limits=[1]), "not enough values to unpack"),
+        (lambda header: header.update(format=1, action_limits=[1]), "not enough values to unpack"),
         (lambda header: header["network"].pop("clip"), "network.clip is missing"),
         (lambda header: header.pop("format"), "format is missing"),
     ],
@@ -195,3 +205,28 @@ def test_a_file_is_on_the_disk_before_it_is_visible(saved, environment, small_co
     monkeypatch.setattr(files, "sync", noted)
     save_policy(path, policy, environment, small_config)
     assert done == [(".00018.npz.partial", False), ("policies", True)]
+
+
+def test_files_of_format_1_act_as_they_did():
+    observations = np.random.default_rng(0).normal(size=(9, 2)).astype(np.float32)
+    paths = sorted(STORED.rglob("*.npz"))
+    for path in paths:
+        with np.load(path) as file:
+            header = json.loads(str(file["header"]))
+            x = (observations - file["observation_mean"]) / np.sqrt(file["observation_variance"] + 1e-8)
+            x = np.clip(x, -10, 10)
+            for layer in range(len(header["network"]["sizes"]) - 1):
+                x = (np.tanh(x) if layer else x) @ file[f"layer_{layer}_kernel"] + file[f"layer_{layer}_bias"]
+        assert header["format"] == 1
+        np.testing.assert_array_equal(load_policy(path)(observations), np.clip(x, *header["action_limits"]))
+    assert len(paths) > 3
+
+
+def test_a_file_of_format_1_only_clips_whatever_its_limits(saved):
+    path = saved[0] / "chosen.npz"
+    actions = load_policy(path).action(np.zeros((1, 2), np.float32))
+    rewritten(path, lambda header: header.update(format=1, action_limits=[-0.05, 35.0]))
+    with np.load(path) as file:
+        kept = {name: file[name] for name in file.files if not name.startswith("action_")}
+    np.savez(path, **kept)
+    np.testing.assert_array_equal(load_policy(path)(np.zeros((1, 2))), np.maximum(actions, -0.05))
