@@ -90,7 +90,7 @@ def _timed_checkpoint(writer: CheckpointWriter, state: RunState) -> Times:
 
 
 def _grown(state: RunState, policies: int, generation: int) -> RunState:
-    """The state with so many policies in archive and buffer."""
+    """Return the state with so many policies in archive and buffer."""
     members = state.archive.members
     copies = tuple(replace(members[index % len(members)], id=index) for index in range(policies))
     buffer = replace(state.buffer, members=copies)
@@ -110,7 +110,7 @@ def _medians(timed: list[Times]) -> Times:
 
 
 def table(costs: dict[str, dict[str, Any]]) -> Table:
-    """The figures, an environment to a row."""
+    """Return the figures, an environment to a row."""
     printed = Table(title="Checkpoints")
     printed.add_column("environment")
     for column in ("generation", "checkpoint", "policies", "MB", "processor time", "if waited for", "bar"):

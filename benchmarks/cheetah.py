@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def _record(config: Config) -> RunRecord:
-    """The run with this config: the paper's, if it is one of them."""
+    """Return the run with this config: the paper's, if it is one of them."""
     plan, item = Plan(), ITEMS["fig7"]
     if config.method == "pgmorl":
         paper = plan.pgmorl(item, "raw", config.seed)
@@ -68,7 +68,7 @@ def _record(config: Config) -> RunRecord:
 
 
 def _judged(record: RunRecord) -> dict[str, Any]:
-    """What a run's front is worth after so many steps, and its curve over the generations."""
+    """Return what a run's front is worth after so many steps, and its curve over the generations."""
     steps = USER_STEPS[CHEETAH]
     utilities = [greatest_utility(record, weights, steps).round(1).tolist() for weights in USERS.values()]
     reference = np.array(record.config["reference_point"])
@@ -99,7 +99,7 @@ def _judged(record: RunRecord) -> dict[str, Any]:
 
 
 def tables(rows: list[dict[str, Any]]) -> list[Table]:
-    """The runs one by one, and the means over seeds."""
+    """Return the runs one by one, and the means over seeds."""
     heads = ("method", "user", "seed", "hypervolume / 1e6", *(f"U {user}" for user in USERS), "fastest m/s")
     each = Table(*heads, "cheapest above 1 m/s", "front", title="Run by run")
     means = Table(*heads[:2], "seeds", *heads[3:], title="Means over the seeds")

@@ -59,7 +59,7 @@ def waited(folder: Path, flags: list[str]) -> dict[str, float]:
 
 
 def commands(run: Path) -> list[list[str]]:
-    """What `make demo` would run, but for the installation."""
+    """Return what `make demo` would run, but for the installation."""
     make = ["make", "--no-print-directory", "--dry-run", "demo", f"DEMO_OUT={run}"]
     lines = subprocess.run(make, cwd=HERE.parent, check=True, capture_output=True, encoding="utf-8").stdout.splitlines()
     return [words for words in map(shlex.split, lines) if Path(words[0]).name == "jmorl"]
@@ -77,7 +77,7 @@ def _name(event: dict[str, Any]) -> str:
 
 
 def table(report: dict[str, Any]) -> Table:
-    """The report for people."""
+    """Return the report for people."""
     shown = Table("seconds until", *BARS, "bar", title="make demo, compilation cache cold and warm")
     for name in report["cold"]:
         bars = [f"{cache} {bar[name]:g}" for cache, bar in BARS.items() if name in bar]

@@ -41,7 +41,7 @@ STANDING_STILL: Sequence[Episode] = [(np.tile([-1.0, 0.0], (TIME_LIMIT, 1)), Fal
 
 
 def first_hits(policies: Sequence[Sequence[Episode]], seed: int = 0) -> tuple[dict[str, int | None], np.ndarray]:
-    """The generation in which each target is reached first, None for never; and sigma after each generation [G, 2].
+    """Return when each target is reached first, None for never, and sigma, after each generation [G, 2].
 
     Generation 0 is the warm-up. A policy is its episodes; they never change.
     """
@@ -59,7 +59,7 @@ def first_hits(policies: Sequence[Sequence[Episode]], seed: int = 0) -> tuple[di
 
 
 def after_untrained(seed: int) -> RunningUnits:
-    """The units after untrained agents: standard normal actions, clipped, which never reach the flag."""
+    """Return the units after untrained agents: standard normal actions, clipped, which never reach the flag."""
     generator = np.random.default_rng(seed)
     units = initial_units(2)
     for _ in range(UNTRAINED_EPISODES):
@@ -69,7 +69,7 @@ def after_untrained(seed: int) -> RunningUnits:
 
 
 def scored(episodes: Sequence[Episode], units: RunningUnits) -> tuple[np.ndarray, RunningUnits]:
-    """The mean discounted return [2] of the episodes in running units, and those after them."""
+    """Return the mean discounted return [2] of the episodes in running units, and those after them."""
     returns = []
     for rewards, terminated in episodes:
         scaled, units = in_running_units(rewards, terminated, units, GAMMA)
@@ -78,14 +78,14 @@ def scored(episodes: Sequence[Episode], units: RunningUnits) -> tuple[np.ndarray
 
 
 def near_optimal_policies() -> list[list[Episode]]:
-    """The fixture's policies, one for each weight, with an episode from each start."""
+    """Return the fixture's policies, one for each weight, with an episode from each start."""
     with np.load(FIXTURE) as file:
         forces, lengths = file["forces"].astype(float), file["lengths"]
     return [[_episode(forces[w, s, : lengths[w, s]]) for s in range(len(STARTS))] for w in range(len(ON_TIME))]
 
 
 def _episode(forces: np.ndarray) -> Episode:
-    """The rewards of a car that reaches the flag with the last of the forces [T]."""
+    """Return the rewards of a car that reaches the flag with the last of the forces [T]."""
     time = np.append(-np.ones(len(forces) - 1), 0.0)
     return np.stack([time, -(forces**2)], axis=1), True
 
@@ -117,7 +117,7 @@ def outcomes(position: np.ndarray, velocity: np.ndarray) -> Outcomes:
 
 
 def action_values(value: np.ndarray, on_time: float, after: Outcomes) -> np.ndarray:
-    """w . r + gamma V(s') [N, F], with V = `value` [K] bilinear between the points of the grid."""
+    """Return w . r + gamma V(s') [N, F], with V = `value` [K] bilinear between the points of the grid."""
     (reached, corner, x, y), across = after, len(VELOCITIES)
     low = (1 - y) * value[corner] + y * value[corner + 1]
     high = (1 - y) * value[corner + across] + y * value[corner + across + 1]
@@ -137,7 +137,7 @@ def optimal_value(on_time: float) -> np.ndarray:  # [K]
 
 
 def greedy_forces(value: np.ndarray, on_time: float) -> tuple[np.ndarray, np.ndarray]:
-    """The forces [S, TIME_LIMIT] from every start, and how many of them [S] it takes to the flag."""
+    """Return the forces [S, TIME_LIMIT] from every start, and how many of them [S] it takes to the flag."""
     position, velocity = STARTS.copy(), np.zeros(len(STARTS))
     forces, lengths = np.zeros((len(STARTS), TIME_LIMIT)), np.zeros(len(STARTS), int)
     for step in range(TIME_LIMIT):

@@ -108,7 +108,7 @@ def _front_on(grid: Grid, weights: np.ndarray) -> Episodes:
 
 
 def _polish_gains(weight: np.ndarray, episodes: Episodes, w: int) -> np.ndarray:
-    """What polishing adds to the utility of a few evenly spread starts of weight number `w`, in per cent."""
+    """Return what polishing adds to the utility of a few evenly spread starts of weight number `w`, in per cent."""
     gains = []
     for s in np.linspace(0, len(DEFAULT_STARTS) - 1, POLISHED_STARTS).round().astype(int):
         forces = episodes.forces[w, : episodes.steps[w, s], s]

@@ -110,7 +110,7 @@ def newton_steps(steps: dict[str, Steps]) -> dict[str, list[int]]:
 
 
 def fixed_steps(steps: dict[str, Steps], count: int) -> dict[str, Any]:
-    """What plain Newton steps miss if there are just so many."""
+    """Return what plain Newton steps miss if there are just so many."""
     with _at_most(count):
         errors = np.concatenate(list(advanced(steps, np.float64).values()))
     return {"steps": count, **distribution(errors)}
@@ -160,7 +160,10 @@ def _started(environments: int) -> tuple[np.ndarray, np.ndarray]:
 def _jax_player(
     physics: str, start: tuple[np.ndarray, np.ndarray], controls: Control, compiled: dict[str, float]
 ) -> Callable[[], None]:
-    """The physics of `HalfCheetah`, its batch over all devices, as one program. Notes its compilation's seconds."""
+    """Return the physics of `HalfCheetah`, its batch over all devices, as one program.
+
+    Notes its compilation's seconds.
+    """
     dynamics = HalfCheetah(physics).physics
 
     def advance(state: BodyState, control: jax.Array) -> tuple[BodyState, None]:
@@ -220,7 +223,7 @@ def _best(players: dict[str, Callable[[], None]], repeats: int, steps: int) -> d
 
 
 def tables(report: dict[str, Any]) -> Iterator[Table]:
-    """The report for people."""
+    """Yield the report for people."""
     rates = Table("environments", "planar", "other", "times as fast", "by processor time")
     for row in report["speed"]:
         for result in filter(None, (row, row.get("beside mjx"))):

@@ -102,7 +102,7 @@ def _best(front: tuple[Policy, ...], column: int) -> Policy:
 
 
 def _exact(keys: jax.Array) -> np.ndarray:
-    """The exact front's utility for each user, [3], from the starts of these keys."""
+    """Return the exact front's utility for each user, [3], from the starts of these keys."""
     return _exact_from(tuple(jax.vmap(envs.make(ENVIRONMENT).initial_state)(keys).position.tolist()))
 
 
@@ -112,7 +112,7 @@ def _exact_from(positions: tuple[float, ...]) -> np.ndarray:
 
 
 def _fresh_shortfall(config: Config, chosen: Policy, column: int) -> float:
-    """The chosen policy's shortfall on fresh episodes."""
+    """Return the chosen policy's shortfall on fresh episodes."""
     keys = jax.random.split(jax.random.key(FRESH_SEED), FRESH_EPISODES)
     moppo = MOPPO(envs.make(ENVIRONMENT), config.ppo)
     returns = jax.jit(moppo.evaluate)(chosen.snapshot, keys)

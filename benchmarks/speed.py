@@ -70,7 +70,7 @@ def main() -> None:
 
 
 def machine() -> dict[str, Any]:
-    """What it was measured on."""
+    """Return what it was measured on."""
     device = jax.devices()[0]
     return {
         "cpu": _cpu_name(),
@@ -82,7 +82,7 @@ def machine() -> dict[str, Any]:
 
 
 def whole_run(env: str, preset: str, generations: int) -> dict[str, Any]:
-    """A PGMORL run at the preset's sizes: the median generation, and where its time goes."""
+    """Measure a PGMORL run at the preset's sizes: the median generation, and where its time goes."""
     config = resolve(preset, None, {"env": env, "method": "pgmorl"})
     iterations = config.population.warmup_iterations + (generations - 1) * config.population.iterations + 1
     config = config.replace(steps=iterations * config.steps_per_iteration)
@@ -114,7 +114,7 @@ def _evaluated_steps(finished: list[GenerationFinished]) -> float:
 
 
 def parts(env: str) -> dict[str, Any]:
-    """The environment alone, with random actions, all of a population's environments on one device."""
+    """Measure the environment alone, with random actions, all of a population's environments on one device."""
     environment = envs.make(env)
     count, steps = 24, 1000
 
@@ -151,7 +151,7 @@ def selection(candidates: int) -> dict[str, Any]:
 
 
 def scaling(env: str) -> list[dict[str, Any]]:
-    """What an agent, and an environment, costs in an iteration as there are more of them.
+    """Return what an agent, and an environment, costs in an iteration as there are more of them.
 
     The sizes take turns, so that a machine that slows down meanwhile slows all of them.
     """
@@ -174,7 +174,7 @@ def scaling(env: str) -> list[dict[str, Any]]:
 
 
 def _training(env: str, agents: int, environments: int) -> Callable[[], Any]:
-    """Some training iterations of a whole population, compiled."""
+    """Return some training iterations of a whole population, compiled."""
     config = resolve("paper", None, {"env": env}).replace(
         population={"agents": agents}, ppo={"environments": environments}, steps=10**9
     )
@@ -238,7 +238,7 @@ def _cpu_name() -> str:
 
 
 def tables(report: dict[str, Any]) -> list[Table]:
-    """The report for people."""
+    """Return the report for people."""
     speed = Table("preset", "", "rate or share", "time", title=f"{report['env']}, {report['machine']['device']}")
     for preset, whole in report["runs"].items():
         for row in _run_rows(whole):

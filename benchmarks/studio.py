@@ -100,6 +100,7 @@ class Still(Session):
         self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: prospect}))
 
     def history(self) -> tuple[()]:
+        """Return no branches."""
         return ()
 
 
@@ -116,7 +117,7 @@ def _policy(number: int, values: np.ndarray) -> Policy:
 
 @contextmanager
 def served(*command: str) -> Iterator[None]:
-    """A server in a process of its own, on PORT."""
+    """Run a server in a process of its own, on PORT."""
     process = subprocess.Popen([sys.executable, "-m", *command], stdout=subprocess.DEVNULL)
     try:
         while True:
@@ -134,6 +135,7 @@ def served(*command: str) -> Iterator[None]:
 
 @contextmanager
 def browser_page() -> Iterator[Page]:
+    """Hold a browser with the page open."""
     with chromium() as browser:
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.goto(f"http://127.0.0.1:{PORT}")
@@ -189,12 +191,13 @@ def _follow(path: Path, with_page: bool, playing: bool) -> None:
 
 
 def _seconds(path: Path) -> np.ndarray:  # [G]
-    """What each generation after the warm-up took."""
+    """Return what each generation after the warm-up took."""
     metrics = read_run(path).metrics
     return np.asarray(sum(metrics[f"{part}_seconds"] for part in ("select", "train", "evaluate")))[1:]
 
 
 def main() -> None:
+    """Measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", nargs="?", choices=["still"], help="serve a question about many policies, and no more")
     parser.add_argument("--host", default="127.0.0.1")

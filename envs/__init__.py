@@ -92,7 +92,7 @@ def ids() -> list[str]:
 
 
 def plain_id(id: str) -> str:
-    """The id without module and options: what MO-Gymnasium calls the environment."""
+    """Return the id without module and options: what MO-Gymnasium calls the environment."""
     return id.partition(",")[0].rpartition(":")[2]
 
 
@@ -134,7 +134,7 @@ def _check_options(name: str, factory: Callable[..., Environment[Any]], options:
 
 
 def _parts(id: str) -> tuple[str, str, dict[str, str]]:
-    """Module, plain id and options of an id as written."""
+    """Return module, plain id and options of an id as written."""
     place, *options = id.split(",")
     module = place.rpartition(":")[0]
     pairs = [option.partition("=") for option in options]

@@ -97,7 +97,7 @@ def _wrong_bounds(environment: Environment[Any]) -> Iterator[str]:
 
 
 def _result(environment: Environment[Any], again: Environment[Any] | None, name: str, *arguments: Any) -> Any:
-    """What a function of the environment gives, with a jax.ShapeDtypeStruct for each array; raises NotAsDeclared."""
+    """Return what a function gives, with a jax.ShapeDtypeStruct for each array. Raises NotAsDeclared."""
     first = _trace(environment, name, *arguments)
     if not first.same_program(_trace(environment, name, *arguments)):
         raise NotAsDeclared(
@@ -113,7 +113,10 @@ def _result(environment: Environment[Any], again: Environment[Any] | None, name:
 
 
 def _trace(environment: Environment[Any], name: str, *arguments: Any) -> Traced:
-    """A function of the environment, traced. Raises NotAsDeclared for one that raises, or that remembers a trace."""
+    """Return a function of the environment, traced.
+
+    Raises NotAsDeclared for one that raises, or that remembers a trace.
+    """
     try:
         result = traced(getattr(environment, name), *arguments)
     except (Exception, SystemExit) as error:
@@ -128,7 +131,7 @@ def _trace(environment: Environment[Any], name: str, *arguments: Any) -> Traced:
 
 
 def _wrong_array(name: str, found: Any, size: int, advice: str) -> Iterator[str]:
-    """What keeps a result from being a vector of `size` real numbers of any kind."""
+    """Yield what keeps a result from being a vector of `size` real numbers of any kind."""
     if not isinstance(found, jax.ShapeDtypeStruct):
         yield f"{name} is {_kind(found)}, not one array of shape {(size,)}: {advice}"
         return
@@ -149,7 +152,7 @@ def _wrong_terminated(found: Any) -> Iterator[str]:
 
 
 def _kind(found: Any) -> str:
-    """What something is that is no array, or not one alone."""
+    """Return what something is that is no array, or not one alone."""
     if isinstance(found, jax.ShapeDtypeStruct):
         return "an array"
     if isinstance(found, tuple | list):
@@ -158,7 +161,7 @@ def _kind(found: Any) -> str:
 
 
 def _changes(start: Any, after: Any) -> list[str]:
-    """What has another form after a step than after a reset."""
+    """Return what has another form after a step than after a reset."""
     if len({jax.tree.structure(start), jax.tree.structure(after)}) > 1:
         return ["the state after a step has other parts than that of a reset"]
     changes = []

@@ -92,18 +92,18 @@ class Environment(ABC, Generic[PhysicsState]):
 
     @abstractmethod
     def initial_state(self, key: jax.Array) -> PhysicsState:
-        """A state drawn from the start distribution."""
+        """Return a state drawn from the start distribution."""
 
     @abstractmethod
     def observe(self, state: PhysicsState) -> jax.Array:  # [O]
-        """What the agent sees of a state: numbers of any kind, which become float32."""
+        """Return what the agent sees of a state: numbers of any kind, which become float32."""
 
     @abstractmethod
     def transition(self, state: PhysicsState, action: jax.Array) -> Transition:
-        """The dynamics: state and action [A] within the box to successor, vector reward and termination."""
+        """Apply the dynamics: state and action [A] within the box to successor, vector reward and termination."""
 
     def scene(self, state: PhysicsState) -> Scene:
-        """A state as a picture, on the host. Raises NoDrawing for an environment that has none."""
+        """Return a state as a picture, on the host. Raises NoDrawing for an environment that has none."""
         raise NoDrawing(f"environment {self.id!r} has no drawing")
 
     def reset(self, key: jax.Array) -> tuple[EpisodeState[PhysicsState], jax.Array]:

@@ -31,6 +31,6 @@ def failure(error: BaseException) -> str:
 
 
 def _message(error: BaseException) -> str:
-    """The message as one line, and no longer than somebody would read."""
+    """Return the message as one line, and no longer than somebody would read."""
     text = " ".join(POSTSCRIPT.sub("", str(error)).split()).rstrip(".")
     return text if len(text) <= LONGEST else f"{text[:LONGEST].rsplit(' ', 1)[0]} ..."

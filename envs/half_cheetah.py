@@ -71,15 +71,18 @@ class HalfCheetah(Environment[BodyState]):
             return PlanarPhysics(self.model)
 
     def initial_state(self, key: jax.Array) -> BodyState:
+        """Return a state drawn from the start distribution."""
         position_key, velocity_key = jax.random.split(key)
         qpos = jax.random.uniform(position_key, (JOINTS,), minval=-RESET_NOISE, maxval=RESET_NOISE)
         qvel = RESET_NOISE * jax.random.normal(velocity_key, (JOINTS,))
         return BodyState(qpos, qvel)
 
     def observe(self, state: BodyState) -> jax.Array:
+        """Return what the agent sees of a state."""
         return jnp.concatenate([state.qpos[1:], state.qvel])
 
     def transition(self, state: BodyState, action: jax.Array) -> Transition:
+        """Apply the dynamics to a state and an action [A]."""
         control = jnp.clip(action, -1.0, 1.0)
         state, displacement = self.physics.advance(state, control, FRAME_SKIP)
         # Not from a difference of positions, which in float32 and 10 km away is wrong by 0.01 m/s and more.
@@ -87,7 +90,7 @@ class HalfCheetah(Environment[BodyState]):
         return Transition(state, jnp.stack([speed, -jnp.sum(control**2)]), jnp.array(False))
 
     def scene(self, state: BodyState) -> Scene:
-        """The runner and the ground around it."""
+        """Return the runner and the ground around it."""
         qpos = np.asarray(state.qpos, np.float64)
         window = Window((qpos[0] - VIEW, qpos[0] + VIEW), (-0.22, 1.3))
         capsules = planar_capsules(self.model, qpos)

@@ -24,6 +24,8 @@ VALLEY = Window((-1.3, 0.7), (0.0, 1.25))
 
 @struct.dataclass
 class CarState:
+    """The car's place and speed."""
+
     position: jax.Array  # []
     velocity: jax.Array  # [] position units per step
 
@@ -38,12 +40,15 @@ class MountainCar(Environment[CarState]):
     time_limit = 999
 
     def initial_state(self, key: jax.Array) -> CarState:
+        """Return a state drawn from the start distribution."""
         return CarState(jax.random.uniform(key, (), minval=-0.6, maxval=-0.4), jnp.zeros(()))
 
     def observe(self, state: CarState) -> jax.Array:
+        """Return what the agent sees of a state."""
         return jnp.stack([state.position, state.velocity])
 
     def transition(self, state: CarState, action: jax.Array) -> Transition:
+        """Apply the dynamics to a state and an action [A]."""
         force = jnp.clip(action[0], -1.0, 1.0)
         velocity = state.velocity + POWER * force - GRAVITY * jnp.cos(3 * state.position)
         velocity = jnp.clip(velocity, -MAX_SPEED, MAX_SPEED)

@@ -31,7 +31,7 @@ def traced(function: Callable[..., Any], *arguments: Any) -> Traced:
 
 
 def kept_tracers(instance: object) -> list[str]:
-    """The attributes in which an instance keeps what was traced and is gone."""
+    """Return the attributes in which an instance keeps what was traced and is gone."""
     attributes = getattr(instance, "__dict__", {})
     return [
         name
@@ -41,7 +41,7 @@ def kept_tracers(instance: object) -> list[str]:
 
 
 def _constants(program: Any) -> Iterator[Any]:
-    """The constants of a program and of the programs within it."""
+    """Yield the constants of a program and of the programs within it."""
     if isinstance(program, ClosedJaxpr):
         yield from program.consts
         yield from _constants(program.jaxpr)

@@ -20,7 +20,10 @@ PAPER_ITEMS = ("table1", "fig5", "fig6", "fig9", "fig10", "table2", "fig7", "fig
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """The options that are given. A flag may be followed by `-999,-999`, which argparse alone takes for a flag."""
+    """Return the options that are given.
+
+    A flag may be followed by `-999,-999`, which argparse alone takes for a flag.
+    """
     joined: list[str] = []
     for argument in map(unicode_argument, arguments):
         if joined and FLAG.fullmatch(joined[-1]) and NEGATIVE_VALUE.fullmatch(argument):
@@ -49,7 +52,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command line takes. `command` of the parsed options is the name of the one given."""
+    """Return what the command line takes. `command` of the parsed options is the name of the one given."""
     whole = _Parser(
         prog="jmorl",
         description="Interactive multi-objective reinforcement learning: train a population, choose, converge.",
@@ -228,12 +231,12 @@ def _preset_value(settings: Any, path: Sequence[str], default: str) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value as on the command line."""
+    """Return a value as on the command line."""
     return ",".join(f"{each:g}" for each in value) if isinstance(value, tuple) else str(value)
 
 
 def _whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Takes a whole number within bounds."""
+    """Return what takes a whole number within bounds from the command line."""
 
     def number(text: str) -> int:
         try:

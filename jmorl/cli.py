@@ -109,7 +109,7 @@ def _branch(options: argparse.Namespace) -> None:
 
 
 def _begun(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> "Continued":
-    """A new run, over defaults of a command's own. Bad input makes nothing."""
+    """Begin a new run, over defaults of a command's own. Bad input makes nothing."""
     import envs
     from jmorl.storage.resume import Continued
     from jmorl.storage.run_folder import RunFolder
@@ -220,7 +220,7 @@ def _open(session: "Session", options: argparse.Namespace) -> None:
 
 
 def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> Config:
-    """The config of the options, over defaults of a command's own.
+    """Return the config of the options, over defaults of a command's own.
 
     Every problem, that of the output folder included, is in one ConfigError.
     """
@@ -267,7 +267,7 @@ def _decision_maker(spec: str, objectives: tuple[Objective, ...]) -> DecisionMak
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, Any]:
-    """The settings given as flags, as nested as the config; values are still strings."""
+    """Return the settings given as flags, as nested as the config; values are still strings."""
     overrides: dict[str, Any] = {}
     for name, value in vars(options).items():
         if name.startswith(SETTING) and value is not None:

@@ -146,7 +146,7 @@ class Config(Section):
         return self.steps // self.steps_per_iteration
 
     def learning_rate(self, iterations_done: int) -> float:
-        """That of a generation, or of the warm-up, which begins after so many iterations of the budget."""
+        """Return the learning rate of what is trained after so many iterations of the budget."""
         share = min(iterations_done / self.iteration_budget, 1.0)
         return (1 - share) * self.ppo.learning_rate + share * self.ppo.final_learning_rate
 
@@ -173,11 +173,11 @@ class Config(Section):
         return stored in (config_format.identity(settings), config_format.identity_of_format_1(settings))
 
     def replace(self, **changes: Any) -> Self:
-        """A validated copy; sections are given as dicts of what changes in them."""
+        """Return a validated copy; sections are given as dicts of what changes in them."""
         return _validated(type(self), _merged(self.model_dump(), changes))
 
     def to_toml(self) -> str:
-        """The config as a file that `resolve` reads back to the same config."""
+        """Return the config as a file that `resolve` reads back to the same config."""
         return tomli_w.dumps({"format": config_format.FORMAT, **self.model_dump(mode="json")})
 
 
@@ -213,7 +213,10 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
 
 
 def _with_underscores(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings whose names may be written as flags are: `warmup-iterations`. Raise ValueError for one given twice."""
+    """Return settings whose names may be written as flags are: `warmup-iterations`.
+
+    Raise ValueError for one given twice.
+    """
     plain: dict[str, Any] = {}
     for written, value in settings.items():
         name = written.replace("-", "_")
@@ -224,7 +227,7 @@ def _with_underscores(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """`changes` over `base`, section by section."""
+    """Return `changes` over `base`, section by section."""
     merged = dict(base)
     for name, value in changes.items():
         below = merged.get(name)

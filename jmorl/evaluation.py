@@ -55,7 +55,7 @@ def _episode_return(environment: Any, policy: StoredPolicy, seed: int | None) ->
 
 
 def _original(id: str, objectives: int) -> Any:
-    """The environment there, or NotInGymnasium."""
+    """Return the environment there, or NotInGymnasium."""
     try:
         import gymnasium
 

@@ -22,6 +22,7 @@ class Seconds:
 
     @property
     def total(self) -> float:
+        """The time of the whole generation."""
         return self.select + self.train + self.evaluate
 
 

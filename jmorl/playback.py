@@ -35,13 +35,13 @@ class Recording:
         return len(self.totals) - 1
 
     def scene(self, step: int) -> Scene:
-        """The picture after so many steps. Raises NoDrawing if the environment has none."""
+        """Return the picture after so many steps. Raises NoDrawing if the environment has none."""
         scene: Scene = self.environment.scene(jax.tree.map(lambda leaf: leaf[step], self.states))
         return scene
 
 
 def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) -> Recording:
-    """A deterministic episode from `key`'s start, to its end or for `most_steps`.
+    """Return a deterministic episode from `key`'s start, to its end or for `most_steps`.
 
     With the same key it is the episode that `jmorl.evaluation.evaluate_stored` scores. Policies of one environment
     share compiled programs. Raises PolicyFileError if that environment cannot be made here.
@@ -75,7 +75,7 @@ class _Programs(NamedTuple):
 
 @lru_cache(maxsize=4)
 def _programs(environment_id: str, most_steps: int | None) -> _Programs:
-    """The programs for one environment, compiled when they are first called."""
+    """Return the programs for one environment, compiled when they are first called."""
     environment = policy_environment(environment_id)
     length = int(min(most_steps or environment.time_limit, environment.time_limit))
     chunks = -(-length // CHUNK)
@@ -97,7 +97,7 @@ def _programs(environment_id: str, most_steps: int | None) -> _Programs:
 
 
 def _arrays(policy: StoredPolicy) -> dict[str, Any]:
-    """What decides about an action."""
+    """Return what decides about an action."""
     return {
         "header": {"network": {name: policy.header["network"][name] for name in ("variance_floor", "clip")}},
         "layers": policy.layers,

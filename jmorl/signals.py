@@ -22,6 +22,7 @@ class Interrupted(KeyboardInterrupt):
 
     @property
     def exit_code(self) -> int:
+        """What shells give for the signal: 130 or 143."""
         return 128 + self.number
 
 

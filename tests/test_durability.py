@@ -112,8 +112,9 @@ def finish(folder, train_arguments):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A folder on a disk of `DISK` bytes, and what limits a process to it: nothing, unless such a disk may not be
-    mounted; then the process cannot write large files.
+    """Make a folder on a disk of `DISK` bytes, and what limits a process to it.
+
+    Nothing has to, unless such a disk may not be mounted; then the process cannot write large files.
     """
     folder = tmp_path / "disk"
     folder.mkdir()

@@ -48,7 +48,7 @@ class Phase:
 
 
 def arguments() -> argparse.Namespace:
-    """The sizes, by default those of the paper with a shortened warm-up."""
+    """Return the sizes, by default those of the paper with a shortened warm-up."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--env", default="mo-mountaincarcontinuous-v0", help="a MO-Gymnasium id with two objectives")
     parser.add_argument("--agents", type=int, default=6, help="P, at least 4")
@@ -67,7 +67,7 @@ def arguments() -> argparse.Namespace:
 
 
 def pgmorl(sizes: argparse.Namespace) -> PGMORL:
-    """The algorithm with jmorl's paper preset."""
+    """Return the algorithm with jmorl's paper preset."""
     return PGMORL(
         env_id=sizes.env,
         origin=REFERENCE_POINT,
@@ -125,7 +125,7 @@ def run(sizes: argparse.Namespace) -> list[Phase]:
 
 
 def split_generations(record: list[Phase]) -> tuple[list[Phase], list[list[Phase]]]:
-    """The warm-up, and the generations: each begins with its selection."""
+    """Return the warm-up, and the generations: each begins with its selection."""
     starts = [i for i, phase in enumerate(record) if phase.name == "select"]
     ends = [*starts[1:], len(record)]
     return record[: starts[0]], [record[start:end] for start, end in zip(starts, ends, strict=True)]
@@ -147,7 +147,7 @@ def summary(phases: list[Phase], steps_per_iteration: int) -> dict[str, Any]:
 
 
 def seconds(phases: list[Phase]) -> dict[str, float]:
-    """What the phases took together."""
+    """Return what the phases took together."""
     return {
         "wall_seconds": round(sum(phase.wall_seconds for phase in phases), 3),
         "cpu_seconds": round(sum(phase.cpu_seconds for phase in phases), 3),

@@ -51,6 +51,7 @@ class Level:
 
     @property
     def count(self) -> int:
+        """How many there are."""
         return self.bodies.stop - self.bodies.start
 
     @property

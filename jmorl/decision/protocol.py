@@ -69,7 +69,7 @@ class AnyQuestion(ABC):
 
 @dataclass(frozen=True)
 class Question(AnyQuestion):
-    """Which of these policies do you prefer?
+    """The question which policy of a front is preferred.
 
     `purpose` is "steer" at the start of a generation and "final" at the end of a run, when the
     answer is the run's result. `front` has at least one member; at the end of an interactive run
@@ -149,7 +149,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class PairQuestion(AnyQuestion):
-    """Which of two policies do you prefer?"""
+    """The question which of two policies is preferred."""
 
     generation: int
     objectives: tuple[Objective, ...]
@@ -186,7 +186,7 @@ class PairQuestion(AnyQuestion):
 
 @dataclass(frozen=True)
 class WeightQuestion(AnyQuestion):
-    """How much does each objective matter to you, compared with the others?"""
+    """The question how much each objective matters, compared with the others."""
 
     generation: int
     objectives: tuple[Objective, ...]

@@ -31,6 +31,7 @@ class Remembered(DecisionMaker):
         self.asking = asking
 
     def respond(self, question: AnyQuestion) -> Any:
+        """Return the answer to a question of any kind."""
         if self.records:
             record = self.records.pop(0)
             if is_of(record, question):
@@ -40,16 +41,20 @@ class Remembered(DecisionMaker):
             return self.user.respond(question)
 
     def answer(self, question: Question) -> Answer:
+        """Return the preferred member of the question's front."""
         answer: Answer = self.respond(question)
         return answer
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
+        """Return the answer to a question of E-NAUTILUS."""
         return self.user.choose_point(question)
 
     def utility(self, values: np.ndarray) -> np.ndarray | None:
+        """Return the utilities [N] of objective vectors [N, M]; None without a utility."""
         return self.user.utility(values)
 
     def satisfied(self, values: np.ndarray) -> bool:
+        """Return whether a run with the front `values` [N, M] may stop early."""
         return self.user.satisfied(values)
 
 

@@ -40,6 +40,7 @@ class ScriptedUser(DecisionMaker):
         self._others = [record for record in records if isinstance(record, AnswerRecord)]
 
     def respond(self, question: AnyQuestion) -> Any:
+        """Return the answer to a question of any kind."""
         if isinstance(question, (Question, PointQuestion)):
             return super().respond(question)
         # The last of equal ones: an answer that was given again replaces the earlier one.
@@ -52,6 +53,7 @@ class ScriptedUser(DecisionMaker):
         )
 
     def answer(self, question: Question) -> Answer:
+        """Return the preferred member of the question's front."""
         place = question.generation, 0
         steering = self._steering.get(place) if question.purpose == "steer" else None
         record = steering or self._final.get(place)
@@ -66,6 +68,7 @@ class ScriptedUser(DecisionMaker):
         return Answer(question.front[index].id, stop, record.generations)
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
+        """Return the answer to a question of E-NAUTILUS."""
         record = self._points.get((question.generation, question.number))
         if record is None:
             raise ScriptError(

@@ -23,6 +23,7 @@ class TargetUser(DecisionMaker):
     scaled: bool = True
 
     def answer(self, question: Question) -> Answer:
+        """Return the preferred member of the question's front."""
         values = question.values
         margins = values - self.target
         if self.scaled:
@@ -32,4 +33,5 @@ class TargetUser(DecisionMaker):
         return Answer(question.front[int(index)].id, stop=reached)
 
     def satisfied(self, values: np.ndarray) -> bool:
+        """Return whether a run with the front `values` [N, M] may stop early."""
         return bool(within(values, self.target).any())

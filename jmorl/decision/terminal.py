@@ -45,6 +45,7 @@ class TerminalUser(DecisionMaker):
         self.read = read
 
     def answer(self, question: Question) -> Answer:
+        """Return the preferred member of the question's front."""
         show_front(self.console, question, by=0)
         while True:
             line = self._line("policy (? for help) > ")
@@ -60,6 +61,7 @@ class TerminalUser(DecisionMaker):
                     self._say(reply)
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
+        """Return the answer to a question of E-NAUTILUS."""
         show_points(self.console, question)
         while True:
             line = self._line("point (? for help) > ")
@@ -69,7 +71,7 @@ class TerminalUser(DecisionMaker):
             self._say(reply)
 
     def _line(self, prompt: str) -> str | None:
-        """What the person types; None at the end of the input."""
+        """Return what the person types; None at the end of the input."""
         try:
             return self.read(prompt)
         except EOFError:
@@ -83,7 +85,7 @@ class TerminalUser(DecisionMaker):
 
 
 def policy_reply(question: Question, line: str) -> Answer | int | str:
-    """What a line means: an answer, an objective's index to list the front by, or a sentence to say and ask again."""
+    """Return what a line means: an answer, an objective's index to list by, or a sentence to say and ask again."""
     words = line.lower().split()
     if words[:1] in (["?"], ["help"]):
         return POLICY_HELP.format(more=f"more {question.objectives[-1].name}")
@@ -108,7 +110,7 @@ def policy_reply(question: Question, line: str) -> Answer | int | str:
 
 
 def point_reply(question: PointQuestion, line: str) -> PointAnswer | str:
-    """What a line means: an answer, or a sentence to say and ask again."""
+    """Return what a line means: an answer, or a sentence to say and ask again."""
     state, shown = question.state, len(question.points)
     words = line.lower().split()
     number = _number(words[1]) if len(words) == 2 else None
@@ -137,7 +139,7 @@ def point_reply(question: PointQuestion, line: str) -> PointAnswer | str:
 
 
 def _policy(question: Question, named: str | None) -> int | str:
-    """The id of the policy somebody named, or of the last choice; a sentence if the front has no such policy."""
+    """Return the id of the policy somebody named, or of the last choice; a sentence if the front has no such policy."""
     ids, previous = [policy.id for policy in question.front], question.previous
     hint = f"choose a policy by its number, for example {ids[0]}, or type ? for help"
     if named is None and previous is None:
@@ -153,7 +155,7 @@ def _policy(question: Question, named: str | None) -> int | str:
 
 
 def _objective(objectives: tuple[Objective, ...], named: str) -> int | str:
-    """The index of the one objective with this number, or whose name or label begins like this; else a sentence."""
+    """Return the index of the objective with this number, or whose name or label begins so; else a sentence."""
     number = _number(named)
     if number and number <= len(objectives):
         return number - 1
@@ -169,5 +171,5 @@ def _objective(objectives: tuple[Objective, ...], named: str) -> int | str:
 
 
 def _number(word: str) -> int | None:
-    """The whole number that the word is, if it is one, and short enough to have been meant."""
+    """Return the whole number that the word is, if it is one, and short enough to have been meant."""
     return int(word) if word.isdecimal() and len(word) <= LONGEST_NUMBER else None

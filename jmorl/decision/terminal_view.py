@@ -15,7 +15,7 @@ PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
 
 def show_front(console: PlainConsole, question: Question, by: int) -> None:
-    """The question, its front with the most of objective `by` first, and a plot of it."""
+    """Show the question, its front with the most of objective `by` first, and a plot of it."""
     heading = front_question(question.purpose, question.generation, len(question.front))
     table = front_table(
         question.front, question.objectives, previous_id=question.previous, by=by, bounds=question.bounds
@@ -27,7 +27,7 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
 
 
 def show_points(console: PlainConsole, question: PointQuestion) -> None:
-    """The question, its points, and a plot of them among the policies still reachable."""
+    """Show the question, its points, and a plot of them among the policies still reachable."""
     state = question.state
     iterations = f"{plural(state.iterations_left, 'iteration')} left"
     reachable = f"{state.reachable.sum()} of {len(question.front)} policies reachable"

@@ -30,7 +30,7 @@ KNOWN = (
 
 
 def make_user(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
-    """The decision maker that `spec` names, ready to be asked.
+    """Return the decision maker that `spec` names, ready to be asked.
 
     Raises ValueError if there is none, or if its script is not there or cannot be read.
     """
@@ -111,7 +111,7 @@ def _terminal_user() -> DecisionMaker:
 
 
 def _numbers(listed: str, name: str, count: int | None) -> list[float]:
-    """The comma-separated finite numbers of a spec, as many as there are objectives."""
+    """Return the comma-separated finite numbers of a spec, as many as there are objectives."""
     numbers = []
     for word in listed.split(","):
         try:

@@ -53,7 +53,9 @@ class UtilityUser(DecisionMaker):
     comparable: bool = True
 
     def answer(self, question: Question) -> Answer:
+        """Return the preferred member of the question's front."""
         return Answer(question.front[int(np.argmax(self.scalarise(question.values)))].id)
 
     def utility(self, values: np.ndarray) -> np.ndarray | None:
+        """Return the utilities [N] of objective vectors [N, M]; None without a utility."""
         return self.scalarise(values) if self.comparable else None

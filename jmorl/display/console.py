@@ -18,4 +18,5 @@ class PlainConsole(Console):
         super().__init__(file=file, markup=False, emoji=False, highlight=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
+        """Return the text as it is, with substitutes for what the terminal lacks."""
         return super().render_str(shown(text, self.encoding), **options)

@@ -58,7 +58,7 @@ def front_scatter(
     width: int,
     height: int,
 ) -> Text:
-    """The vectors as o and the marks as their characters, in plain text; for two objectives.
+    """Draw the vectors as o and the marks as their characters, in plain text; for two objectives.
 
     What is far out is left out, with a word about it, unless a mark is as far out. `width` and `height` are in
     characters, all included.
@@ -83,7 +83,7 @@ def front_scatter(
 
 
 def stacked_label(objective: Objective) -> str:
-    """The quantity above its unit, for the head of a column."""
+    """Return the quantity above its unit, for the head of a column."""
     return f"{objective.label}\n({objective.unit})"
 
 

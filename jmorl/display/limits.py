@@ -31,7 +31,7 @@ def hopeful(values: np.ndarray) -> np.ndarray:
 
 
 def around(values: np.ndarray, margin: float = 0.06) -> np.ndarray:
-    """The limits of axes around the vectors [N, M], with a share of their extent as margin: lows and highs [2, M].
+    """Return limits of axes around the vectors [N, M], with a share of their extent as margin: lows and highs [2, M].
 
     Those that are not finite do not count; without any the limits are 0 and 1.
     """

@@ -43,7 +43,10 @@ class PlainTable:
             yield table
 
     def _parts(self, width: int, encoding: str) -> Iterator[dict[int, int]]:
-        """The columns of each part with their widths, so that a part fits into the width. Empty ones are left out."""
+        """Yield the columns of each part with their widths, so that a part fits into the width.
+
+        Empty ones are left out.
+        """
         columns = [[heading, *(cells[index] for cells, _ in self.rows)] for index, heading in enumerate(self.headings)]
         columns = [[shown(text, encoding) for text in column] for column in columns]
         most = [max(map(_line_width, column)) for column in columns]
@@ -83,7 +86,7 @@ class PlainTable:
 
 
 def _spread(part: Sequence[int], least: Sequence[int], most: Sequence[int], width: int) -> dict[int, int]:
-    """What each column of a part gets: what it needs, and of what is left what it may use, from the first on."""
+    """Return what each column of a part gets: what it needs, and of what is left what it may use, from the first on."""
     left = max(width - _total([least[index] for index in part]), 0)
     widths = {}
     for index in part:

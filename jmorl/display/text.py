@@ -17,7 +17,7 @@ REASONS = {  # why a run ended
 
 
 def number_format(values: np.ndarray, digits: int = 3) -> str:
-    """A format that shows the range of most of the values [N] with so many significant digits.
+    """Return a format that shows the range of most of the values [N] with so many significant digits.
 
     NaN and infinity are ignored, and values far out do not count; without a range, the distance to 0 does.
     """
@@ -30,12 +30,12 @@ def number_format(values: np.ndarray, digits: int = 3) -> str:
 
 
 def number(value: float) -> str:
-    """A number that stands alone, with four significant digits."""
+    """Return a number that stands alone, with four significant digits."""
     return f"{value:{number_format(np.array([value]), digits=4)}}" if value else "0"
 
 
 def short_count(count: float) -> str:
-    """A number of at least 0 with three significant digits: 950, 24.0 k, 2.64 M."""
+    """Return a number of at least 0 with three significant digits: 950, 24.0 k, 2.64 M."""
     for size, prefix in PREFIXES:
         scaled = count / size
         if scaled >= 0.9995:
@@ -64,7 +64,7 @@ def plural(count: int, noun: str) -> str:
 
 
 def front_question(purpose: str, generation: int, policies: int) -> str:
-    """The question about a front of so many policies; `purpose` and `generation` are a Question's."""
+    """Return the question about a front of so many policies; `purpose` and `generation` are a Question's."""
     if purpose == "final":
         which = f"Which of these {policies} policies is its result?" if policies > 1 else "Is this policy its result?"
         return f"The run is over. {which}"
@@ -73,7 +73,7 @@ def front_question(purpose: str, generation: int, policies: int) -> str:
 
 
 def objective_label(objective: Objective) -> str:
-    """The quantity and its unit, for headings and axes."""
+    """Return the quantity and its unit, for headings and axes."""
     return f"{objective.label} ({objective.unit})"
 
 

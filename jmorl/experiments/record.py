@@ -125,10 +125,12 @@ class RunRecord:
 
     @property
     def total_steps(self) -> int:
+        """Environment steps used for learning."""
         return self.generations[-1].steps if self.generations else 0
 
     @property
     def total_seconds(self) -> float:
+        """What the whole run took, in seconds."""
         return float(self.seconds[-1]) if self.generations else 0.0
 
     @property

@@ -91,6 +91,7 @@ class Times:
 
     @property
     def successes(self) -> int:
+        """How many runs reached the target."""
         return sum(steps is not None for steps in self.reached)
 
     @property

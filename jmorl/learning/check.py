@@ -62,7 +62,7 @@ def _trace_programs(environment: Environment[Any], ppo: PPOConfig, evaluation: E
 
 
 def _traced(environment: Environment[Any], program: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """The shapes of what a program gives; raises NotAsDeclared for what stops it."""
+    """Return the shapes of what a program gives; raises NotAsDeclared for what stops it."""
     try:
         return jax.eval_shape(function, *arguments)
     except (Exception, SystemExit) as error:

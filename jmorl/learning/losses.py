@@ -41,7 +41,7 @@ def action_bound_loss(
     low: jax.typing.ArrayLike,  # [] or [A] normalised, as `ActionBox.normalized_bounds`
     high: jax.typing.ArrayLike,
 ) -> jax.Array:  # []
-    """The squared distance of the mean actions from the box [low, high], summed over A, mean over the batch.
+    """Return the squared distance of the mean actions from the box [low, high], summed over A, mean over the batch.
 
     Beyond the box all samples do the same, so nothing else pulls a mean back that was driven there while the
     noise was large. (The "bounds loss" of rl_games, Makoviichuk and Makoviychuk 2021.)

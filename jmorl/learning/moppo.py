@@ -81,11 +81,11 @@ class Diagnostics(NamedTuple):
     fault_iteration: jax.Array  # [] int32, from 1; meaningless without a fault
 
     def means(self) -> dict[str, float]:
-        """The numbers of a population [P], averaged over its agents."""
+        """Return the numbers of a population [P], averaged over its agents."""
         return {name: float(getattr(self, name).mean()) for name in self._fields if not name.startswith("fault")}
 
     def cause(self, agent: int, objectives: Sequence[Objective]) -> str:
-        """What stopped being finite for an agent of a population: `observation[3]`, `reward of energy`, or `loss`."""
+        """Return what stopped being finite for an agent: `observation[3]`, `reward of energy`, or `loss`."""
         fault, component = FAULTS[self.fault[agent]], int(self.fault_component[agent])
         match fault:
             case "observation":
@@ -107,10 +107,12 @@ class MOPPO:
 
     @cached_property
     def actor(self) -> Any:  # Actor; flax types what `apply` returns too widely
+        """The network of the policy."""
         return Actor(self.config.hidden_sizes, self.environment.action_size, self.config.initial_log_std)
 
     @cached_property
     def critic(self) -> Any:
+        """The network of the values."""
         return critic_network(self.config.hidden_sizes, len(self.environment.objectives))
 
     @cached_property
@@ -123,7 +125,7 @@ class MOPPO:
         return optax.flatten(optax.chain(clip, optax.scale_by_adam(eps=self.config.adam_epsilon)))
 
     def initial_train_state(self, key: jax.Array) -> TrainState:
-        """A new agent's networks, optimiser and statistics."""
+        """Return a new agent's networks, optimiser and statistics."""
         actor_key, critic_key = jax.random.split(key)
         observation = jnp.zeros(self.environment.observation_size)
         parameters = {
@@ -274,7 +276,7 @@ class MOPPO:
         return (parameters, optimizer_state), diagnostics
 
     def loss(self, parameters: Parameters, batch: Batch) -> tuple[jax.Array, Diagnostics]:
-        """The PPO loss of one minibatch, and its parts."""
+        """Return the PPO loss of one minibatch, and its parts."""
         mean, log_std = self.actor.apply(parameters["actor"], batch.observation)
         values = self.critic.apply(parameters["critic"], batch.observation)
         log_probability = gaussian_log_probability(mean, log_std, batch.action)
@@ -294,7 +296,7 @@ class MOPPO:
         return loss, Diagnostics(policy_loss, value_loss, entropy, kl, jnp.array(0), jnp.array(0), jnp.array(0))
 
     def policy(self, train_state: TrainState) -> Any:
-        """The agent as a function of one raw observation [O]: mean and log-std [A] of the normalised action."""
+        """Return the agent as a function of one raw observation [O]: mean and log-std [A] of the normalised action."""
         return lambda observation: self.actor.apply(
             train_state.parameters["actor"], normalize(train_state.observation_statistics, observation)
         )
@@ -316,7 +318,7 @@ class MOPPO:
 
 
 def _random_order(key: jax.Array, size: int) -> jax.Array:
-    """The indices below `size` in random order [size].
+    """Return the indices below `size` in random order [size].
 
     Sorts words whose high bits are random and whose low bits are the index: nearly ten times as fast on a CPU as
     `jax.random.permutation`, which takes a fifth of a training iteration. Indices that draw equal high bits stay
@@ -333,7 +335,7 @@ def _fault(
     parameters: Parameters,
     diagnostics: Diagnostics,
 ) -> tuple[jax.Array, jax.Array]:
-    """The first cause, in the order in which one would bring about the next, of numbers that are not finite.
+    """Return the first cause, in the order in which one would bring about the next, of numbers that are not finite.
 
     With it comes the first component in which it is found.
     """

@@ -41,6 +41,7 @@ class MLP(nn.Module):
 
     @nn.compact
     def __call__(self, x: jax.Array) -> jax.Array:  # [..., O] -> [..., output_size]
+        """Apply the network."""
         for size in self.hidden_sizes:
             x = nn.tanh(nn.Dense(size, kernel_init=orthogonal(math.sqrt(2)))(x))
         return nn.Dense(self.output_size, kernel_init=orthogonal(self.output_gain))(x)

@@ -63,7 +63,7 @@ def rollout(
 
 
 def correlated_noise(key: jax.Array, shape: tuple[int, int], correlation: float) -> jax.Array:
-    """Standard normal noise [T, A], correlated from one step to the next as a first-order autoregression.
+    """Return standard normal noise [T, A], correlated from one step to the next as a first-order autoregression.
 
     Correlated noise explores further than independent noise of the same size (Hollenstein et al. 2024).
     """

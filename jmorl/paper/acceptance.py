@@ -69,8 +69,10 @@ def _how_surely(target: str, difference: Difference) -> str:
 
 
 def explanations(published: PublishedTable, rows: Sequence[TargetRow]) -> list[str]:
-    """Explain the differences on one target in paper units: a sentence for each method whose successes, or place, are
-    not the published ones. The cause is moving units, a defect that is not copied, or our own shortfall.
+    """Explain the differences on one target in paper units.
+
+    There is a sentence for each method whose successes, or place, are not the published ones. The cause is moving
+    units, a defect that is not copied, or our own shortfall.
     """
     pair = pair_of(rows)
     if pair is None:

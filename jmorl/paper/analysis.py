@@ -79,6 +79,7 @@ class Finals:
 
     @property
     def everything(self) -> np.ndarray:  # [S + 1, M]
+        """The policies of both methods."""
         return np.vstack([self.interactive, self.enautilus])
 
 

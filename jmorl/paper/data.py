@@ -27,6 +27,7 @@ class PublishedRow:
 
     @property
     def successes(self) -> int:
+        """How many runs reached the target."""
         return self.RUNS - self.timeouts
 
 
@@ -40,6 +41,7 @@ class PublishedTable:
     rows: tuple[PublishedRow, ...]
 
     def row(self, target: str, method: str) -> PublishedRow:
+        """Return the row of a target and a method."""
         return next(row for row in self.rows if (row.target, row.method) == (target, method))
 
     def mean_steps(self, target: str, method: str) -> float:
@@ -82,6 +84,7 @@ class Honest:
 
 @cache
 def published() -> Published:
+    """Return the paper's published numbers."""
     return TypeAdapter(Published).validate_json(_text("published.json"))
 
 

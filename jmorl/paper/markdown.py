@@ -162,4 +162,5 @@ def _struck(text: str, kept: bool) -> str:
 
 
 def totals(steps: float, seconds: float, runs: int) -> str:
+    """Return the totals as a sentence."""
     return f"{runs} runs, {million(steps)} steps, {duration(seconds)}"

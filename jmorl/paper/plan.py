@@ -79,6 +79,7 @@ class Plan:
     seeds: tuple[int, ...] | None = None
 
     def seeds_of(self, item: Item) -> tuple[int, ...]:
+        """Return the seeds of an item."""
         if self.quick and not self.seeds:
             return QUICK_SEEDS
         return self.seeds or (TARGET_SEEDS if item.kind == "steps to targets" else USER_SEEDS)

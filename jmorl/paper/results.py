@@ -25,6 +25,7 @@ class Pair:
 
     @property
     def rows(self) -> tuple[TargetRow, TargetRow]:
+        """Both rows."""
         return self.interactive, self.baseline
 
 
@@ -75,6 +76,7 @@ class Curves:
 
     @property
     def last(self) -> np.ndarray:  # [S]
+        """The last values [S]."""
         return self.utility[:, -1]
 
     @property

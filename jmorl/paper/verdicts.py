@@ -66,6 +66,7 @@ def _faults(pair: Pair) -> str:
 
 
 def steps_saved(difference: Difference) -> str:
+    """Return the difference in words."""
     between = f"[{million(difference.low)}, {million(difference.high)}]"
     return f"{million(difference.mean)} steps {between} ({difference.certainty})"
 

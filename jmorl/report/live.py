@@ -64,12 +64,14 @@ class LiveView(Watcher):
 
     @contextmanager
     def asking(self) -> Iterator[None]:
+        """Leave the screen alone while somebody is asked on it."""
         if self.config.user.strip() == "terminal":
             self._live.transient = True
             self._live.stop()
         yield
 
     def show(self, event: Event) -> None:
+        """Show what has just happened."""
         self.timeline = self.timeline.after(event, self.clock())
         if not self._live.is_started:
             self._live = self._new()
@@ -88,7 +90,7 @@ class LiveView(Watcher):
         return min(self.console.width, WIDTH) - 4
 
     def panel(self) -> Panel:
-        """The picture of this moment."""
+        """Return the picture of this moment."""
         timeline, now = self.timeline, self.clock()
         parts: list[RenderableType] = [self._bar(timeline, now), self._facts(timeline, now)]
         if timeline.finished and (len(self.objectives) == 2 or not timeline.result):
@@ -98,7 +100,7 @@ class LiveView(Watcher):
         return Panel(Group(*parts), title=title, title_align="left", width=self._room + 4)
 
     def _bar(self, timeline: Timeline, now: float) -> RenderableType:
-        """What is going on, and how much of the budget is used; without a bar where the screen is too narrow."""
+        """Return what is going on, and how much of the budget is used; without a bar where the screen is too narrow."""
         steps, total = timeline.steps(now), timeline.total_steps
         phase, used = Text(_phase(timeline), "bold"), f"{short_count(steps)} of {short_count(total)} steps"
         if len(phase) + LEAST_BAR + len(used) > self._room:
@@ -144,7 +146,7 @@ class LiveView(Watcher):
             yield "", "nothing but the choice itself lay within the bounds"
 
     def _front(self, timeline: Timeline) -> list[RenderableType]:
-        """The front as a plot of two objectives, or as a table of more, if there is room."""
+        """Return the front as a plot of two objectives, or as a table of more, if there is room."""
         assert timeline.finished is not None
         members = timeline.finished.state.archive.members
         lines = min(self.console.height - FACT_LINES, PLOT_LINES)

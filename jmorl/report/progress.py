@@ -10,7 +10,7 @@ from jmorl.report.watchers import Json, Lines, Quiet, Watcher
 
 
 def watcher(kind: str, config: Config, objectives: tuple[Objective, ...], console: PlainConsole) -> Watcher:
-    """Who shows the events of a run: `with watcher(...) as watching: watching.show(event)`.
+    """Return who shows the events of a run, each given to its `show`, within a `with` block.
 
     "live" redraws a view of the run on a terminal. "lines" is one for each event. "json" goes to standard output,
     whatever the console is. "quiet" shows nothing. Raises ValueError for another kind.

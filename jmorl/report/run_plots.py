@@ -30,7 +30,7 @@ BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
 
 
 def progress_figure(run: StoredRun, title: str) -> Figure:
-    """Utility if the user has one, hypervolume, and sizes, each over the steps used for learning."""
+    """Draw utility if the user has one, hypervolume, and sizes, each over the steps used for learning."""
     has_utility = not np.isnan(run.metrics["utility_max"]).all()
     drawings = [_draw_utility] * has_utility + [_draw_hypervolume, _draw_sizes]
     heights = [1.4] * has_utility + [1.4, 0.9]
@@ -64,7 +64,7 @@ def prediction_figure(run: StoredRun, title: str) -> Figure | None:
 
 
 def _changes(run: StoredRun) -> tuple[list[int], np.ndarray, np.ndarray] | None:
-    """Generation, predicted and realised change [N, M] of all offspring; None if there are none."""
+    """Return generation, predicted and realised change [N, M] of all offspring; None if there are none."""
     generations, predicted, realised = [], [], []
     for policy in run.policies:
         if policy.predicted is not None and policy.parent is not None:
@@ -119,7 +119,7 @@ def _focus(axes: Axes) -> None:
 
 
 def _choice_steps(run: StoredRun) -> list[float]:
-    """The environment steps after which the user was asked."""
+    """Return the environment steps after which the user was asked."""
     return [
         float(run.metrics["steps"][record.generation - 1])
         for record in run.decisions

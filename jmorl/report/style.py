@@ -66,7 +66,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float, title: str) -> Figure:
-    """An empty figure, in inches, whose layout keeps everything apart."""
+    """Return an empty figure, in inches, whose layout keeps everything apart."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
@@ -87,7 +87,7 @@ def generation_colour(generation: int, last: int) -> Colour:
 
 
 def generation_bar(figure: Figure, axes: Sequence[Axes], last: int) -> None:
-    """The key of `generation_colour`, beside the axes; nothing with just the warm-up."""
+    """Draw the key of `generation_colour`, beside the axes; nothing with just the warm-up."""
     if last:
         ticks = MaxNLocator(6, integer=True)
         bar = figure.colorbar(_generations(last), ax=list(axes), shrink=0.7, aspect=30, pad=0.015, ticks=ticks)
@@ -96,7 +96,7 @@ def generation_bar(figure: Figure, axes: Sequence[Axes], last: int) -> None:
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist], columns: int) -> None:
-    """The legend of all axes, below them."""
+    """Draw the legend of all axes, below them."""
     figure.legend(handles=handles, loc="outside lower center", ncols=columns)
 
 
@@ -107,7 +107,7 @@ def label_axes(axes: Axes, x: Objective, y: Objective) -> None:
 
 
 def note(axes: Axes, text: str) -> None:
-    """A small remark above the axes, at their right end."""
+    """Write a small remark above the axes, at their right end."""
     axes.set_title(text, loc="right", fontsize=8, color=GREY)
 
 

@@ -29,7 +29,7 @@ def run_tables(run: StoredRun) -> list[RenderableType]:
 
 
 def run_heading(run: StoredRun) -> RenderableType:
-    """What was run, on what, for how long, and how it ended."""
+    """Return what was run, on what, for how long, and how it ended."""
     config, device = run.config, run.manifest["device"]
     steps, seconds = run.metrics["steps"][-1], run_seconds(run)
     rows = {
@@ -50,7 +50,7 @@ def run_heading(run: StoredRun) -> RenderableType:
 
 
 def run_seconds(run: StoredRun) -> float:
-    """The time of all generations, the waiting for answers not counted."""
+    """Return the time of all generations, the waiting for answers not counted."""
     return float(sum(run.metrics[f"{part}_seconds"].sum() for part in ("select", "train", "evaluate")))
 
 
@@ -98,7 +98,7 @@ def decisions_table(run: StoredRun) -> PlainTable:
 
 
 def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> PlainTable:
-    """What fresh episodes [N] of a stored policy with this header brought, beside its score in the run."""
+    """Return what fresh episodes [N] of a stored policy with this header brought, beside its score in the run."""
     undiscounted = np.asarray(returns.undiscounted, float)
     spread = "std.\nerror", "std.\ndev.", "\nworst", "\nbest"
     table = PlainTable("\nobjective", "\nmean", *spread, "in its\nrun", "dis-\ncounted", words=["\nobjective"])
@@ -117,7 +117,7 @@ def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Plai
 
 
 def comparison_table(header: Mapping[str, Any], ours: np.ndarray, theirs: np.ndarray, z: np.ndarray) -> PlainTable:
-    """Returns [N, M] here and in MO-Gymnasium, side by side; `z` [M] is the difference in standard errors."""
+    """Return the returns [N, M] here and in MO-Gymnasium, side by side; `z` [M] is their difference in std. errors."""
     spread = "std.\ndev.", "std.\nerror"
     headings = "jmorl\nmean", *spread, "MO-Gym.\nmean", *spread, "difference in\nstd. errors"
     table = PlainTable("\nobjective", *headings, words=["\nobjective"])

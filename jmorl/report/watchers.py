@@ -44,6 +44,7 @@ class Quiet(Watcher):
     """Shows nothing."""
 
     def show(self, event: Event) -> None:
+        """Show what has just happened."""
         pass
 
 
@@ -56,6 +57,7 @@ class Lines(Watcher):
         self.generations = Timeline(config, since=0.0).generations
 
     def show(self, event: Event) -> None:
+        """Show what has just happened."""
         self.console.print(self._line(event), soft_wrap=True)
         if isinstance(event, RunFinished):
             show_result(self.console, event, self.objectives)
@@ -120,6 +122,7 @@ class Json(Watcher):
         self.generations = Timeline(config, since=0.0).generations
 
     def show(self, event: Event) -> None:
+        """Show what has just happened."""
         self.file.write(json.dumps(_finite(self._fields(event)), allow_nan=False) + "\n")
         self.file.flush()
 
@@ -170,7 +173,7 @@ class Json(Watcher):
 
 
 def question_name(decided: Decided) -> str:
-    """What was asked."""
+    """Return what was asked."""
     return (
         "final choice"
         if decided.question.purpose == "final"
@@ -198,7 +201,7 @@ def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
 
 
 def show_result(console: PlainConsole, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
-    """The final front, with the chosen policy marked."""
+    """Show the final front, with the chosen policy marked."""
     table = front_table(event.state.archive.members, objectives, event.chosen.id)
     table.title = "Final front"
     console.print()
@@ -217,7 +220,7 @@ def _policy_fields(policy: Policy) -> dict[str, Any]:
 
 
 def _finite(content: Any) -> Any:
-    """The same without infinity and NaN, which JSON does not know."""
+    """Return the same without infinity and NaN, which JSON does not know."""
     match content:
         case dict():
             return {name: _finite(value) for name, value in content.items()}

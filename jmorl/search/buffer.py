@@ -20,7 +20,7 @@ class PerformanceBuffer:
     members: tuple[Policy, ...] = ()  # in the order they came
 
     def offer(self, policies: Sequence[Policy], scale: Scale) -> "PerformanceBuffer":
-        """The buffer with the policies added, and all of them sorted anew into bins under this scale.
+        """Return the buffer with the policies added, and all of them sorted anew into bins under this scale.
 
         A bin keeps the `size` farthest from the origin, where values below the origin count as on it; ties
         go to the earlier. Raises ValueError if a policy's values are not one finite number per objective.
@@ -35,7 +35,7 @@ class PerformanceBuffer:
 
 
 def direction_bins(points: np.ndarray, bins: int) -> np.ndarray:
-    """The bin of each point [N, M] >= 0 seen from zero, [N]; zero itself is in bin 0.
+    """Return the bin of each point [N, M] >= 0 seen from zero, [N]; zero itself is in bin 0.
 
     Two objectives: equal angles. More: the nearest by angle of an even grid of directions, as many as fit
     into `bins`, but no fewer than M.

@@ -18,7 +18,7 @@ SMALLEST_DAMPING, FIRST_DAMPING, LARGEST_DAMPING = 1e-9, 1e-1, 1e9
 
 
 def tanh_curve(parameters: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """`A tanh(a (x - b) / 2) + c` (Xu et al. 2020), parameters [4, F], x [R, F] -> [R, F]."""
+    """Return `A tanh(a (x - b) / 2) + c` (Xu et al. 2020), parameters [4, F], x [R, F] -> [R, F]."""
     amplitude, steepness, centre, offset = parameters
     return amplitude * np.tanh(steepness * (x - centre) / 2) + offset
 
@@ -28,7 +28,7 @@ def fit_tanh(
     y: np.ndarray,  # [R, F]
     importance: np.ndarray,  # [R, F] factor of each residual; 0: not a record of this fit
 ) -> np.ndarray:  # [4, F]
-    """The bounded soft-L1 fit of `tanh_curve` to each column of (x, y).
+    """Find the bounded soft-L1 fit of `tanh_curve` to each column of (x, y).
 
     Minimises `s^2 sum(sqrt(1 + (r / s)^2) - 1)`, where `r = importance (curve - y)` and s is the loss scale,
     by Levenberg-Marquardt on all fits together, with the damping of Nielsen (1999). Starts at
@@ -81,7 +81,7 @@ def _fit(x: np.ndarray, y: np.ndarray, importance: np.ndarray) -> np.ndarray:  #
 
 
 def fit_cost(parameters: np.ndarray, x: np.ndarray, y: np.ndarray, importance: np.ndarray) -> np.ndarray:  # [F]
-    """What `fit_tanh` minimises."""
+    """Return what `fit_tanh` minimises."""
     squares = (importance * (tanh_curve(parameters, x) - y) / LOSS_SCALE) ** 2
     # q / (1 + sqrt(1 + q)) is sqrt(1 + q) - 1 without the cancellation near zero
     return LOSS_SCALE**2 * (squares / (1 + np.sqrt(1 + squares))).sum(axis=0)

@@ -59,8 +59,9 @@ def solid_gains(points: np.ndarray, front: np.ndarray, reference: np.ndarray) ->
 
 
 def solid_limits(points: np.ndarray, front: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Upper limits of the volume that each of the points [Q, 3] adds to the front [N, 3]: it, and more than any
-    rounding; [Q].
+    """Return upper limits [Q] of the volume that each of the points [Q, 3] adds to the front [N, 3].
+
+    They are the volumes, and more than any rounding.
     """
     size = hypervolume(front, reference) + np.maximum(points - reference, 0.0).prod(axis=1)
     return solid_gains(points, front, reference) + 1e-12 * size
@@ -85,7 +86,7 @@ def estimated_gains(points: np.ndarray, front: np.ndarray, reference: np.ndarray
 
 
 def measured_gain(point: np.ndarray, front: np.ndarray, reference: np.ndarray) -> float:
-    """The hypervolume that a point [M] adds to the front [N, M]: its box less what members dominate of that.
+    """Return the hypervolume that a point [M] adds to the front [N, M]: its box less what members dominate of that.
 
     Where the exact volume would take long it is estimated from the point downwards, along fixed directions: how far
     it is to what a member dominates. That is much closer than `estimated_gains`, and takes much longer.
@@ -112,8 +113,10 @@ def directions(objectives: int, count: int) -> np.ndarray:
 
 
 def _combined(edges: np.ndarray, inverse: np.ndarray, combine: np.ufunc) -> np.ndarray:
-    """How far it is along the directions, given inverse [D, M], to the first (`np.minimum`) or the last (`np.maximum`)
-    of the sides of boxes with the edges [Q, M]; [Q, D]."""
+    """Return how far it is along the directions to a side of boxes with the edges [Q, M], [Q, D].
+
+    The directions are given inverse [D, M]; `np.minimum` is for the first of the sides, `np.maximum` for the last.
+    """
     distance = edges[:, 0, None] * inverse[:, 0]
     other = np.empty_like(distance)
     for edge, each in zip(edges.T[1:], inverse.T[1:], strict=True):
@@ -131,7 +134,7 @@ def _power(reach: np.ndarray, exponent: int) -> np.ndarray:
 
 
 def _content(edges: np.ndarray) -> float:
-    """The volume of a star-shaped body in a box with edges [M], per mean of its reach to the power of M.
+    """Return the volume of a star-shaped body in a box with edges [M], per mean of its reach to the power of M.
 
     The reach is along `directions`, in the box scaled to one.
     """

@@ -16,7 +16,7 @@ def non_dominated(values: np.ndarray) -> np.ndarray:
 
 
 def hypervolume(values: np.ndarray, reference: np.ndarray) -> float:
-    """The volume that the vectors [N, M] dominate above the reference point [M].
+    """Return the volume that the vectors [N, M] dominate above the reference point [M].
 
     Vectors that are not above it in every objective contribute nothing; N may be zero. Exact where `exact_is_quick`,
     else approximate: the same for the same vectors, and within a hundredth where that was compared.

@@ -25,6 +25,7 @@ class Records:
 
     @classmethod
     def empty(cls, objectives: int) -> "Records":
+        """Return no records of a number of objectives."""
         return cls(*np.zeros((3, 0, objectives)))
 
     def add(self, parents: np.ndarray, weights: np.ndarray, children: np.ndarray) -> "Records":

@@ -57,7 +57,7 @@ def _greedy(
     count: int,
     sparsity_weight: float,
 ) -> list[int]:
-    """Indices of the points that are best to add to the front, one after the other; each at most once."""
+    """Return indices of the points that are best to add to the front, one after the other; each at most once."""
     gains = _first_gains(points, front, reference)
     idle = covered(points, front)
     taken: list[int] = []
@@ -106,7 +106,7 @@ class _Slot:
         self.losses[~idle] = sparsity_weight * (sparsity_limits(points[~idle], front) - self.sparsity)
 
     def exact_best(self) -> int:
-        """The point with the largest score, the first of equal ones.
+        """Return the point with the largest score, the first of equal ones.
 
         What has the largest limit is measured, until that has been measured already (Minoux 1978).
         """
@@ -130,7 +130,7 @@ class _Slot:
             scores[best] = self.gains[best] - self.losses[best]
 
     def likely_best(self) -> int:
-        """The best of the points that are measured, which are those with the best estimates."""
+        """Return the best of the points that are measured, which are those with the best estimates."""
         screened = self._leading(SCREENED)
         self.gains[screened] = estimated_gains(self.points[screened], self.front, self.reference, FINE)
         measured = self._leading(MEASURED)
@@ -146,7 +146,7 @@ class _Slot:
         return scores
 
     def _leading(self, count: int) -> np.ndarray:
-        """Indices of the `count` points with the largest scores that are not idle."""
+        """Return indices of the `count` points with the largest scores that are not idle."""
         others = np.flatnonzero(~self.idle)
         if count >= len(others):
             return others
@@ -182,8 +182,7 @@ def sparsity_limits(points: np.ndarray, front: np.ndarray) -> np.ndarray:
 
 
 def _first_not_beaten(points: np.ndarray, members: np.ndarray) -> np.ndarray:
-    """For each of the points [Q, M], how many of the members [N, M] in their order it beats before one that it does
-    not, [Q]."""
+    """Return how many of the members [N, M], in their order, each of the points [Q, M] beats before one it does not."""
     beaten = np.zeros(len(points), int)
     going_on = np.arange(len(points))
     for member in members:

@@ -10,7 +10,7 @@ LARGE_GRID = 10_000
 
 
 def candidate_grid(objectives: int, divisions: int) -> np.ndarray:
-    """The grid of so many divisions, or, where that has over a hundred weights, the finest that has not, [W, M].
+    """Return the grid of so many divisions, or, where that has over a hundred weights, the finest that has not, [W, M].
 
     The corners are always in it.
     """
@@ -18,7 +18,7 @@ def candidate_grid(objectives: int, divisions: int) -> np.ndarray:
 
 
 def finest_divisions(objectives: int, most: int) -> int:
-    """The largest number of divisions, from 1, whose grid has `most` weights or fewer; two objectives or more."""
+    """Return the most divisions, from 1, whose grid has `most` weights or fewer; for two objectives or more."""
     divisions = 1
     while _grid_size(objectives, divisions + 1) <= most:
         divisions += 1
@@ -51,7 +51,7 @@ def evenly_spaced_weights(objectives: int, count: int) -> np.ndarray:
 
 
 def _spread_steps(objectives: int, count: int) -> np.ndarray:
-    """A grid, as integers, with at least ten times `count` weights and the centre."""
+    """Return a grid, as integers, with at least ten times `count` weights and the centre."""
     divisions = objectives  # and multiples of it: then the centre is a grid point
     while _grid_size(objectives, divisions) < 10 * count:
         divisions += objectives

@@ -70,7 +70,7 @@ def new_manifest(config: Config, parent: Manifest | None = None) -> Manifest:
 
 
 def circumstances() -> Manifest:
-    """What the last bits of a run's numbers may depend on."""
+    """Return what the last bits of a run's numbers may depend on."""
     device = jax.devices()[0]
     return {
         "python": platform.python_version(),
@@ -113,11 +113,12 @@ def differences(before: Manifest, here: Manifest) -> list[str]:
 
 
 def now() -> str:
+    """Return the present time as text, UTC."""
     return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
 
 
 def _commit() -> str | None:
-    """The commit of the source tree, with a mark if it was changed since; None outside a repository."""
+    """Return the commit of the source tree, with a mark if it was changed since; None outside a repository."""
     command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--abbrev=40"]
     try:
         found = subprocess.run(command, capture_output=True, encoding="utf-8", check=True, timeout=10)

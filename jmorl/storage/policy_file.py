@@ -80,16 +80,16 @@ class StoredPolicy:
     box: ActionBox
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """The deterministic action in the environment's own units, within its box."""
+        """Return the deterministic action in the environment's own units, within its box."""
         action: np.ndarray = self.action(np.asarray(observation, np.float32))
         return action
 
     def action(self, observation: Any, xp: ModuleType = np) -> Any:
-        """The same; `xp` may be `jax.numpy` to trace it."""
+        """Return the deterministic action; `xp` may be `jax.numpy` to trace it."""
         return self.box.action(self._network(observation, xp), xp)
 
     def _network(self, observation: Any, xp: ModuleType) -> Any:
-        """The mean of the normalised action."""
+        """Return the mean of the normalised action."""
         floor, limit = self.header["network"]["variance_floor"], self.header["network"]["clip"]
         x = (observation - self.observation_mean) / xp.sqrt(self.observation_variance + floor)
         x = xp.clip(x, -limit, limit)
@@ -238,13 +238,13 @@ def _box(arrays: dict[str, np.ndarray]) -> ActionBox:
 
 
 def _clipping_box(header: dict[str, Any], size: int) -> ActionBox:
-    """The same of a file of format 1."""
+    """Return the box of a file of format 1, whose policies are clipped and not scaled."""
     low, high = (np.full(size, limit, np.float32) for limit in header["action_limits"])
     return ActionBox(low, high, np.zeros(size, np.float32), np.ones(size, np.float32))
 
 
 def policy_environment(environment_id: str) -> Environment[Any]:
-    """The environment that a policy's header names. Raises PolicyFileError if it cannot be made here."""
+    """Return the environment that a policy's header names. Raises PolicyFileError if it cannot be made here."""
     try:
         return envs.make(environment_id)
     except ValueError as error:

@@ -176,7 +176,7 @@ def _tidy(path: Path) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[RunLock]:
-    """The folder's lock, which stays held unless the block fails."""
+    """Hold the folder's lock, which stays held unless the block fails."""
     try:
         lock = RunLock(path)
     except OSError as error:

@@ -146,7 +146,7 @@ class RunFolder:
         write_text(self.layout.front, csv_text(rows, list(rows[0])))
 
     def logs(self) -> dict[str, str]:
-        """What a checkpoint keeps of the logs."""
+        """Return what a checkpoint keeps of the logs."""
         logs = {log.path.name: log.text for log in (self.metrics, self.policies)}
         return {**logs, self.decisions.path.name: self.decisions.past}
 

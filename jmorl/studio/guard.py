@@ -40,6 +40,7 @@ class Guard:
         self.token = token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Apply the network."""
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return

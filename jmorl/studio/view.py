@@ -75,7 +75,7 @@ class View:
 
 
 def stored_view(path: Path) -> View:
-    """What a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
+    """Return what a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
     manifest, config = read_manifest(path), resolve(file=Layout(path).config)
     objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
     nothing = View(path, manifest["run"], config, objectives, (), (), np.full(len(objectives), -np.inf), None, (), None)

@@ -113,7 +113,7 @@ def test_a_large_hypervolume_is_approximate_and_always_the_same(objectives: int,
 
 
 def test_the_vectors_of_a_hypervolume_stay_as_they_are() -> None:
-    """moocore takes what was unpickled for a copy of its own."""
+    """Moocore takes what was unpickled for a copy of its own."""
     values = pickle.loads(pickle.dumps(np.array([[1.0, 2.0], [2.0, 1.0]])))
     assert hypervolume(values, np.zeros(2)) == 3.0
     np.testing.assert_array_equal(values, [[1.0, 2.0], [2.0, 1.0]])
