@@ -66,8 +66,10 @@ def parsed_rows(text: str, name: str) -> list[dict[str, str]]:
     except csv.Error as error:
         raise ValueError(f"{name} is not a CSV file: {error}") from None
     for number, row in enumerate(rows, start=2):
-        if None in row or None in row.values():
-            raise ValueError(f"{name}, line {number} has {'more' if None in row else 'fewer'} cells than the header")
+        if None in row.values():
+            raise ValueError(f"{name}, line {number} ends too early")
+        if None in row:
+            raise ValueError(f"{name}, line {number} has more cells than the header")
     return [{current_name(column): cell for column, cell in row.items()} for row in rows]
 
 

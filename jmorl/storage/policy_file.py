@@ -227,7 +227,7 @@ def _checked_arrays(path: Path) -> dict[str, np.ndarray]:
         with np.load(content, allow_pickle=False) as arrays:
             return dict(arrays)
     except OSError as error:
-        raise PolicyFileError(f"{path} cannot be read: {error.strerror or error}") from error
+        raise PolicyFileError(f"{path} is not a policy file: {error.strerror or error}") from error
     except (ValueError, KeyError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise PolicyFileError(f"{path} is not a policy file: {error}") from error
 

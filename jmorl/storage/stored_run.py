@@ -74,7 +74,7 @@ def read_run(path: Path) -> StoredRun:
     layout = Layout(path)
     if not layout.manifest.exists() or not layout.metrics.exists():
         raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up")
-    with _reading(path):
+    with _reading(layout.root, " as a run"):
         manifest = read_manifest(path)
         config = resolve(file=layout.config)
         check_config(path, manifest, config)
@@ -96,21 +96,21 @@ def read_run(path: Path) -> StoredRun:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    """Turn what goes wrong in reading a file, or a folder, into StoredRunError that names it."""
+def _reading(path: Path, kind: str = "") -> Iterator[None]:
+    """Turn what goes wrong in reading a file, or a folder of some kind, into StoredRunError that names it."""
     try:
         yield
     except NewerFormat:
         raise
     except KeyError as error:
-        raise StoredRunError(f"{path} cannot be read: it has no {error}") from error
+        raise StoredRunError(f"{path} cannot be read{kind}: it has no {error}") from error
     except OSError as error:
-        raise StoredRunError(f"{error.filename or path} cannot be read: {error.strerror}") from error
+        raise StoredRunError(f"{path} cannot be read{kind}: {error.strerror}: {error.filename}") from error
     except ConfigError as error:
         raise StoredRunError(f"{Layout(path).config} cannot be used: {'; '.join(error.problems)}") from error
     except (ValueError, TypeError, IndexError, ScriptError) as error:
-        named = str(path) in str(error)
-        raise StoredRunError(str(error) if named else f"{path} cannot be read: {error}") from error
+        named = str(error).startswith(f"{path},")
+        raise StoredRunError(str(error) if named else f"{path} cannot be read{kind}: {error}") from error
 
 
 def _result(path: Path) -> Mapping[str, Any]:

@@ -65,7 +65,7 @@ def test_columns_are_read_by_todays_names(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a,b\n1,2\n1\n", "line 3 has fewer cells"),
+        ("a,b\n1,2\n1\n", "line 3 ends too early"),
         ("a,b\n1,2,3\n", "line 2 has more cells"),
         (f"a\n{'x' * 200_000}\n", "field larger"),
     ],
