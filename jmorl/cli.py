@@ -36,7 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from envs.drawing import NoDrawing
     from jmorl.decision.records import ScriptError
     from jmorl.evaluation import NotInGymnasium
-    from jmorl.learning.devices import use_all_cpu_cores
+    from jmorl.learning.devices import NoDevices, check_devices, use_all_cpu_cores
+    from jmorl.learning.execution import ComputationFailed
+    from jmorl.learning.memory import DoesNotFit
     from jmorl.learning.population import TrainingFault
     from jmorl.paper.record import RecordError
     from jmorl.playback import PlaybackError
@@ -50,13 +52,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wrong_place = (CannotContinue, FolderInUse, NewerFormat, PolicyFileError, RecordError, StoredRunError)
     use_all_cpu_cores()
     try:
+        if options.command in COMPUTING:
+            check_devices()
         COMMANDS[options.command](options)
     except ConfigError as error:
         return _failed(error.problems, EXIT_BAD_INPUT)
-    except (*wrong_place, NoDrawing, NotAsDeclared, NotInGymnasium, PlaybackError) as error:
+    except (*wrong_place, DoesNotFit, NoDevices, NoDrawing, NotAsDeclared, NotInGymnasium, PlaybackError) as error:
         return _failed([str(error)], EXIT_BAD_INPUT)
-    except (TrainingFault, ScriptError, EOFError, OSError, CheckpointError) as error:
+    except (TrainingFault, ComputationFailed, ScriptError, EOFError, OSError, CheckpointError) as error:
         return _failed([f"stopped: {error}", *_notes(error)], EXIT_FAILED)
+    except MemoryError as error:
+        return _failed([f"stopped: there is no memory left: {error}", *_notes(error)], EXIT_FAILED)
     except Interrupted as error:
         return _failed([str(error), *_notes(error)], error.exit_code)
     except KeyboardInterrupt:
@@ -122,6 +128,7 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     from rich.console import Console
 
     from jmorl.events import RunFinished
+    from jmorl.learning.execution import ComputationFailed
     from jmorl.report.plots import draw_run
     from jmorl.report.progress import watcher
     from jmorl.storage.checkpoints import CheckpointError
@@ -151,7 +158,7 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
                 watching.show(event)
                 if not isinstance(event, RunFinished):
                     stop.check()
-    except (CheckpointError, EOFError, Interrupted, OSError) as error:
+    except (CheckpointError, ComputationFailed, EOFError, Interrupted, MemoryError, OSError) as error:
         error.add_note(f"what the run had is kept; go on with: jmorl resume {path}")
         raise
     stored = read_run(path)
@@ -367,6 +374,8 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "paper": _paper,
     "envs": _envs,
 }
+
+COMPUTING = ("train", "resume", "branch", "studio", "evaluate", "play", "paper")  # these need JAX's devices
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import numpy as np
 
 from envs.core import Environment
 from envs.drawing import Scene
+from jmorl.learning.execution import result_of
 from jmorl.storage.policy_file import StoredPolicy, policy_environment
 
 
@@ -45,7 +46,7 @@ def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) 
     share a compiled program. Raises PolicyFileError if that environment cannot be made here.
     """
     environment, episode = _program(policy.header["environment"], most_steps)
-    first, (states, rewards, endings) = jax.device_get(episode(_arrays(policy), key))
+    first, (states, rewards, endings) = result_of(episode, _arrays(policy), key)
     steps = int(np.argmax(endings)) + 1 if endings.any() else len(endings)
     states = jax.tree.map(lambda start, after: np.concatenate([start[None], after[:steps]]), first, states)
     totals = np.concatenate([np.zeros((1, rewards.shape[1])), np.cumsum(rewards[:steps], axis=0, dtype=np.float64)])

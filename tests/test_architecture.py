@@ -21,7 +21,7 @@ MAY_IMPORT = {
     "jmorl.learning": {"envs", "jax", "jmorl.config"},
     "jmorl.scoring": {"jmorl.learning", "jmorl.units"},
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
-    "jmorl.playback": {"envs", "jax", "jmorl.storage"},
+    "jmorl.playback": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.state": {"jmorl.config", "jmorl.search", "jmorl.units"},
     "jmorl.loop": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.learning", "jmorl.scoring", "jmorl.search"),

@@ -10,9 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
-from envs.checks import check_environment
 from envs.core import Environment
 from jmorl.config import Config
+from jmorl.learning.checks import check_run
+from jmorl.learning.execution import compiled, own_settings, result_of
 from jmorl.learning.moppo import MOPPO, Diagnostics, Schedule, TrainState
 from jmorl.learning.rollout import EpisodeReturns
 
@@ -46,10 +47,10 @@ class Programs(Protocol):
 
 
 class CompiledPrograms:
-    """The programs for so many runs. Raises NotAsDeclared for an environment that is not what it says."""
+    """The programs for so many runs. Raises NotAsDeclared and DoesNotFit, as `check_run`."""
 
     def __init__(self, environment: Environment[Any], config: Config, runs: int = 1):
-        check_environment(environment)
+        check_run(environment, config, runs)
         self.runs = runs
         self.agents = runs * config.population.agents
         self.episodes = config.evaluation.episodes
@@ -72,23 +73,27 @@ class CompiledPrograms:
         started = time.perf_counter()
         keys = jax.random.split(jax.random.key(0), self.agents)
         start_keys = jax.random.split(jax.random.key(0), self.runs * self.episodes)
-        train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
+        with own_settings():
+            train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
         weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
-        self._train = self._train.lower(train_states, weights, keys, schedule_of(0, 0.0)).compile()
-        self._evaluate = self._evaluate.lower(train_states, start_keys).compile()
+        self._train = compiled(self._train, train_states, weights, keys, schedule_of(0, 0.0))
+        self._evaluate = compiled(self._evaluate, train_states, start_keys)
         self._compiled = True
         return time.perf_counter() - started
 
     def initialize(self, keys: jax.Array) -> TrainState:
-        return jax.device_get(self._initialize(keys))
+        train_states: TrainState = result_of(self._initialize, keys)
+        return train_states
 
     def train(
         self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
     ) -> tuple[TrainState, Diagnostics]:
-        return jax.device_get(self._train(train_states, weights, keys, schedule))
+        trained: tuple[TrainState, Diagnostics] = result_of(self._train, train_states, weights, keys, schedule)
+        return trained
 
     def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
-        return jax.device_get(self._evaluate(train_states, keys))
+        returns: EpisodeReturns = result_of(self._evaluate, train_states, keys)
+        return returns
 
 
 def schedule_of(iterations: int, learning_rate: float) -> Schedule:

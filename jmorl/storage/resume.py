@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import envs
-from envs.checks import check_environment
 from envs.core import Environment
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.protocol import DecisionMaker
@@ -17,6 +16,7 @@ from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
 from jmorl.events import Event
+from jmorl.learning.checks import check_run
 from jmorl.learning.population import Population
 from jmorl.loop import run
 from jmorl.search.policy import Policy
@@ -158,7 +158,7 @@ def _read_start(path: Path) -> tuple[Manifest, Config]:
 
 def _environment(config: Config) -> Environment[Any]:
     environment = envs.make(config.env)
-    check_environment(environment)
+    check_run(environment, config)
     return environment
 
 

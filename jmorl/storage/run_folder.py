@@ -27,10 +27,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from envs.checks import check_environment
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.events import Decided, Event, GenerationFinished, RunFinished
+from jmorl.learning.checks import check_run
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
 from jmorl.storage.decision_log import DecisionLog
@@ -71,10 +71,10 @@ class RunFolder:
         """Make the folder, with config and manifest. Raises FolderInUse as `check_free` does, or if it cannot be made.
 
         `parent` is as in `new_manifest`. Raises NotAsDeclared, having changed nothing, for an environment that is not
-        what it says.
+        what it says, and DoesNotFit for a run that is too large for the memory there is.
         """
         check_free(path, force)
-        check_environment(environment)
+        check_run(environment, config)
         try:
             path.mkdir(parents=True, exist_ok=True)
             lock = RunLock(path)
