@@ -6,55 +6,43 @@ The names here and in `envs` are all that a program needs; see the README.
 from jmorl.module_path import BESIDE  # noqa: F401  imported first: it decides which modules all others find
 
 # isort: split
+import importlib
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from envs import Objective
-from jmorl.config import Config, ConfigError, resolve
-from jmorl.decision.navigation import NavigationFinished, PointDecided, navigate
-from jmorl.decision.protocol import (
-    Adjust,
-    Answer,
-    AnswerError,
-    AnyQuestion,
-    Back,
-    Choose,
-    DecisionMaker,
-    PairQuestion,
-    PointAnswer,
-    PointQuestion,
-    Question,
-    WeightQuestion,
-)
-from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
-from jmorl.learning.devices import use_all_cpu_cores
-from jmorl.learning.population import TrainingFault
-from jmorl.loop import run
-from jmorl.methods.base import Method, PackedSearch, Problem, Prospect, Tasks
-from jmorl.methods.registry import register as register_method
-from jmorl.search.policy import Policy
-from jmorl.state import RunState
-from jmorl.storage.policy_file import load_policy, save_policy
-from jmorl.storage.resume import branch, resume
-from jmorl.storage.run_folder import RunFolder
-from jmorl.storage.stored_run import read_run
+if TYPE_CHECKING:
+    from envs import Objective
+    from jmorl.config import Config, ConfigError, resolve
+    from jmorl.decision.navigation import NavigationFinished, PointDecided, navigate
+    from jmorl.decision.protocol import (
+        Adjust,
+        Answer,
+        AnswerError,
+        AnyQuestion,
+        Back,
+        Choose,
+        DecisionMaker,
+        PairQuestion,
+        PointAnswer,
+        PointQuestion,
+        Question,
+        WeightQuestion,
+    )
+    from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
+    from jmorl.experiments.comparison import Comparison, Contender, compare
+    from jmorl.learning.devices import use_all_cpu_cores
+    from jmorl.learning.population import TrainingFault
+    from jmorl.loop import run
+    from jmorl.methods.base import Method, PackedSearch, Problem, Prospect, Tasks
+    from jmorl.methods.registry import register as register_method
+    from jmorl.search.policy import Policy
+    from jmorl.state import RunState
+    from jmorl.storage.policy_file import load_policy, save_policy
+    from jmorl.storage.resume import branch, resume
+    from jmorl.storage.run_folder import RunFolder
+    from jmorl.storage.stored_run import read_run
 
 __version__ = version("jmorl")
-if TYPE_CHECKING:
-    from jmorl.experiments import Comparison, Contender, compare
-else:
-
-    def __getattr__(name: str) -> Any:
-        """Import what comparisons need when one of its names is used: a program that only trains does without."""
-        if name not in ("Comparison", "Contender", "compare"):
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from jmorl.experiments import comparison
-
-        return getattr(comparison, name)
-
-    def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
-
 
 __all__ = [
     "Adjust",
@@ -104,3 +92,44 @@ __all__ = [
     "save_policy",
     "use_all_cpu_cores",
 ]
+
+# Imported when they are first used: JAX refuses to be imported where a variable of its own has a value that it cannot
+# read, and the command line is to say so.
+_HOMES = {
+    "jmorl.config": "Config ConfigError resolve",
+    "jmorl.decision.navigation": "NavigationFinished PointDecided navigate",
+    "jmorl.decision.protocol": "Adjust Answer AnswerError AnyQuestion Back Choose DecisionMaker PairQuestion "
+    "PointAnswer PointQuestion Question WeightQuestion",
+    "jmorl.events": "Compiled Decided Event GenerationFinished Resumed RunFinished Seconds",
+    "jmorl.experiments.comparison": "Comparison Contender compare",
+    "jmorl.learning.devices": "use_all_cpu_cores",
+    "jmorl.learning.population": "TrainingFault",
+    "jmorl.loop": "run",
+    "jmorl.methods.base": "Method PackedSearch Problem Prospect Tasks",
+    "jmorl.search.policy": "Policy",
+    "jmorl.state": "RunState",
+    "jmorl.storage.policy_file": "load_policy save_policy",
+    "jmorl.storage.resume": "branch resume",
+    "jmorl.storage.run_folder": "RunFolder",
+    "jmorl.storage.stored_run": "read_run",
+    "envs": "Objective",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name, from its module; or a module, such as `jmorl.events`."""
+    if name == "register_method":
+        return importlib.import_module("jmorl.methods.registry").register
+    for home, names in _HOMES.items():
+        if name in names.split():
+            return getattr(importlib.import_module(home), name)
+    try:
+        return importlib.import_module(f"jmorl.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"jmorl.{name}":
+            raise
+        raise AttributeError(f"module 'jmorl' has no attribute {name!r}") from None
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -44,7 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from jmorl.decision.records import ScriptError
     from jmorl.evaluation import NotInGymnasium
     from jmorl.experiments.record import RecordError
-    from jmorl.learning.devices import use_all_cpu_cores
+    from jmorl.learning.devices import NoDevices, check_devices, use_all_cpu_cores
+    from jmorl.learning.execution import ComputationFailed
+    from jmorl.learning.memory import DoesNotFit
     from jmorl.learning.population import TrainingFault
     from jmorl.playback import PlaybackError
     from jmorl.storage.checkpoints import CheckpointError
@@ -57,13 +59,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wrong_place = (CannotContinue, FolderInUse, NewerFormat, PolicyFileError, RecordError, StoredRunError)
     use_all_cpu_cores()
     try:
+        if options.command in COMPUTING:
+            check_devices()
         COMMANDS[options.command](options)
     except ConfigError as error:
         return _failed(error.problems, EXIT_BAD_INPUT)
-    except (*wrong_place, NoDrawing, NotAsDeclared, NotInGymnasium, PlaybackError) as error:
+    except (*wrong_place, DoesNotFit, NoDevices, NoDrawing, NotAsDeclared, NotInGymnasium, PlaybackError) as error:
         return _failed([str(error)], EXIT_BAD_INPUT)
-    except (TrainingFault, ScriptError, EOFError, OSError, CheckpointError) as error:
+    except (TrainingFault, ComputationFailed, ScriptError, EOFError, OSError, CheckpointError) as error:
         return _failed([f"stopped: {error}", *_notes(error)], EXIT_FAILED)
+    except MemoryError as error:
+        return _failed([f"stopped: there is no memory left: {error}", *_notes(error)], EXIT_FAILED)
     except Interrupted as error:
         return _failed([str(error), *_notes(error)], error.exit_code)
     except KeyboardInterrupt:
@@ -127,6 +133,7 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     """
     from jmorl.display.console import PlainConsole
     from jmorl.events import RunFinished
+    from jmorl.learning.execution import ComputationFailed
     from jmorl.report.progress import watcher
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.run_folder import folder_bytes
@@ -155,7 +162,7 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
                 watching.show(event)
                 if not isinstance(event, RunFinished):
                     stop.check()
-    except (CheckpointError, EOFError, Interrupted, OSError) as error:
+    except (CheckpointError, ComputationFailed, EOFError, Interrupted, MemoryError, OSError) as error:
         error.add_note(f"what the run had is kept; go on with: {command('resume', path)}")
         raise
     stored = read_run(path)
@@ -385,6 +392,8 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "paper": _paper,
     "envs": _envs,
 }
+
+COMPUTING = ("train", "resume", "branch", "studio", "evaluate", "play", "paper")  # these need JAX's devices
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import numpy as np
 
 import envs
 from envs.mujoco_model import quiet_mujoco
+from jmorl.learning.execution import result_of
 from jmorl.learning.rollout import EpisodeReturns, episode_returns
 from jmorl.storage.policy_file import StoredPolicy, policy_environment
 
@@ -20,7 +21,7 @@ def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
     """Deterministic episodes of a stored policy in its environment, one for each start key [episodes].
 
     Another number of episodes is another compiled program: the last bits of a return may differ. Raises
-    PolicyFileError if the environment cannot be made here.
+    PolicyFileError if the environment cannot be made here, and ComputationFailed.
     """
     environment = policy_environment(policy.header["environment"])
     discount = policy.header["discount"]
@@ -28,7 +29,7 @@ def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
     def episode(key: jax.Array) -> EpisodeReturns:
         return episode_returns(environment, lambda observation, _: policy.action(observation, jnp), key, discount)
 
-    returns: EpisodeReturns = jax.device_get(jax.jit(jax.vmap(episode))(keys))
+    returns: EpisodeReturns = result_of(jax.jit(jax.vmap(episode)), keys)
     return returns
 
 

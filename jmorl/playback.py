@@ -11,6 +11,7 @@ import numpy as np
 
 from envs.core import Environment
 from envs.drawing import Scene
+from jmorl.learning.execution import result_of
 from jmorl.storage.policy_file import StoredPolicy, policy_environment
 
 CHUNK = 1000  # steps that are computed at once, at most
@@ -48,12 +49,12 @@ def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) 
     """
     programs = _programs(policy.header["environment"], most_steps)
     arrays = _arrays(policy)
-    episode = programs.start(key)
-    first = jax.device_get(episode[0].physics)
+    episode = result_of(programs.start, key)
+    first = episode[0].physics
     chunks = []
     for _ in range(programs.chunks):  # not in one program: the time limit may be far beyond the end
-        episode, chunk = programs.go_on(arrays, episode)
-        chunks.append(jax.device_get(chunk))
+        episode, chunk = result_of(programs.go_on, arrays, episode)
+        chunks.append(chunk)
         if chunks[-1][2].any():
             break
     states, rewards, endings = jax.tree.map(lambda *parts: np.concatenate(parts)[: programs.length], *chunks)

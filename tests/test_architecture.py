@@ -32,7 +32,7 @@ MAY_IMPORT = {
     "jmorl.arguments": {"envs", "jmorl.config", "jmorl.display", "jmorl.presets", "jmorl.settings"},
     "jmorl.scoring": {"jmorl.learning", "jmorl.units"},
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
-    "jmorl.playback": {"envs", "jax", "jmorl.storage"},
+    "jmorl.playback": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.events": {"jmorl.decision", "jmorl.search", "jmorl.state"},
     "jmorl.loop": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.methods"),

@@ -10,6 +10,8 @@ import numpy as np
 from envs.checks import NotAsDeclared, check_environment, name_of
 from envs.core import Environment
 from envs.failures import failure
+from jmorl.learning.execution import own_settings
+from jmorl.learning.memory import check_memory
 from jmorl.learning.moppo import MOPPO, Schedule
 from jmorl.learning.settings import EvaluationConfig, LearningConfig, PPOConfig
 
@@ -19,17 +21,21 @@ MOST_BYTES = 2**32  # of what evaluation keeps for every step up to the time lim
 _checked: WeakValueDictionary[tuple[int, PPOConfig, EvaluationConfig], Environment[Any]] = WeakValueDictionary()
 
 
-def check_programs(environment: Environment[Any], config: LearningConfig, again: Environment[Any]) -> None:
-    """Raise NotAsDeclared unless an environment keeps the contract and fits what a run with `config` computes.
+def check_run(
+    environment: Environment[Any], config: LearningConfig, again: Environment[Any] | None = None, runs: int = 1
+) -> None:
+    """Raise NotAsDeclared for an environment that a run with `config` cannot use, DoesNotFit for one that is too large.
 
-    `again` is the environment that the run's id stands for, made anew: it must be the same.
+    `again` is what the run's id stands for, made anew: it must be the same. `runs` is how many share a program.
     """
-    check_environment(environment, again if type(again) is type(environment) else None)
-    _check_length(environment, config)
-    settings = id(environment), config.ppo, config.evaluation
-    if _checked.get(settings) is not environment:
-        _trace_programs(environment, config.ppo, config.evaluation)
-        _checked[settings] = environment
+    with own_settings():
+        check_environment(environment, again if type(again) is type(environment) else None)
+        _check_length(environment, config)
+        check_memory(environment, config, runs)
+        settings = id(environment), config.ppo, config.evaluation
+        if _checked.get(settings) is not environment:
+            _trace_programs(environment, config.ppo, config.evaluation)
+            _checked[settings] = environment
 
 
 def _check_length(environment: Environment[Any], config: LearningConfig) -> None:

@@ -1,10 +1,16 @@
-"""Setting JAX up before its first use: CPU cores as devices, and a compilation cache on disk."""
+"""Setting JAX up before its first use: CPU cores as devices, a compilation cache on disk, and whether it works."""
 
 import os
 from contextlib import suppress
 from pathlib import Path
 
 import jax
+
+START = ("JAX_PLATFORMS", "JAX_NUM_CPU_DEVICES", "CUDA_VISIBLE_DEVICES")  # what decides about the devices
+
+
+class NoDevices(RuntimeError):
+    """JAX has nothing to compute on, as it is set."""
 
 
 def usable_cores() -> int:
@@ -40,3 +46,14 @@ def use_all_cpu_cores() -> None:
         jax.config.update("jax_compilation_cache_dir", str(cache))
     if "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS" not in os.environ:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+
+
+def check_devices() -> None:
+    """Start JAX. Raises NoDevices if it has no device to compute on."""
+    try:
+        jax.devices()
+    except Exception as error:  # of several kinds, without a message if a platform that is asked for is not there
+        values = [f"{name}={os.environ[name]}" for name in START if name in os.environ]
+        asked = f" with {', '.join(values)}" if values else ""
+        said = str(error) or "there is no such device here"
+        raise NoDevices(f"JAX cannot start{asked}: {said}") from error

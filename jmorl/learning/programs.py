@@ -14,8 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, PartitionSpec
 
-from envs.checks import check_environment
 from envs.core import Environment
+from jmorl.learning.check import check_run
+from jmorl.learning.execution import compile_for, own_settings, result_of
 from jmorl.learning.moppo import MOPPO, Diagnostics, Schedule, TrainState
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.learning.settings import LearningConfig
@@ -29,11 +30,11 @@ class Programs:
 
     Train states cross this boundary as host arrays with a leading N axis, so that the search can store, mix and
     inherit them without touching a device. Get them from `compiled`, so that nothing is compiled twice. Raises
-    NotAsDeclared for an environment that is not what it says.
+    NotAsDeclared and DoesNotFit, as `check_run` does; every call raises ComputationFailed.
     """
 
     def __init__(self, environment: Environment[Any], config: LearningConfig, runs: int = 1):
-        check_environment(environment)
+        check_run(environment, config, runs=runs)
         self.runs = runs
         self.agents = runs * config.agents
         self.episodes = config.evaluation.episodes
@@ -59,30 +60,34 @@ class Programs:
             started = time.perf_counter()
             keys = jax.random.split(jax.random.key(0), self.agents)
             start_keys = jax.random.split(jax.random.key(0), self.runs * self.episodes)
-            train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
+            with own_settings():
+                train_states = jax.eval_shape(jax.vmap(self.moppo.initial_train_state), keys)
             weights = np.zeros((self.agents, len(self.moppo.environment.objectives)), np.float32)
             schedule = Schedule(np.int32(0), np.float32(0))
-            self._train = self._train.lower(train_states, weights, keys, schedule).compile()
-            self._evaluate = self._evaluate.lower(train_states, start_keys).compile()
+            self._train = compile_for(self._train, train_states, weights, keys, schedule)
+            self._evaluate = compile_for(self._evaluate, train_states, start_keys)
             self._compiled = True
             return time.perf_counter() - started
 
     def initialize(self, keys: jax.Array) -> TrainState:
         """Return a new train state for each key [N]."""
-        return jax.device_get(self._initialize(keys))
+        train_states: TrainState = result_of(self._initialize, keys)
+        return train_states
 
     def train(
         self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
     ) -> tuple[TrainState, Diagnostics]:
         """Train every agent [N, ...] with its weights [N, M] and its key [N]."""
-        return jax.device_get(self._train(train_states, weights, keys, schedule))
+        trained: tuple[TrainState, Diagnostics] = result_of(self._train, train_states, weights, keys, schedule)
+        return trained
 
     def evaluate(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
         """Return the returns [N, episodes, M] of every agent [N, ...], a run's from equal keys.
 
         `keys` has [episodes] of each run in turn.
         """
-        return jax.device_get(self._evaluate(train_states, keys))
+        returns: EpisodeReturns = result_of(self._evaluate, train_states, keys)
+        return returns
 
 
 def compiled(environment: Environment[Any], config: LearningConfig, runs: int = 1) -> Programs:

@@ -17,7 +17,7 @@ from jmorl.decision.remembered import Remembered
 from jmorl.decision.users import make_user
 from jmorl.display.commands import command
 from jmorl.events import Event
-from jmorl.learning.check import check_programs
+from jmorl.learning.check import check_run
 from jmorl.learning.population import Population
 from jmorl.loop import make_method, run
 from jmorl.search.policy import Policy
@@ -128,7 +128,7 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
 
 def _environment(config: Config) -> Environment[Any]:
     environment = envs.make(config.env)
-    check_programs(environment, config.learning, envs.make_anew(config.env))
+    check_run(environment, config.learning, envs.make_anew(config.env))
     return environment
 
 

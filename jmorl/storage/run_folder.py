@@ -33,7 +33,7 @@ from envs.core import Environment
 from jmorl.config import Config
 from jmorl.display.commands import command
 from jmorl.events import Decided, Event, GenerationFinished, RunFinished
-from jmorl.learning.check import check_programs
+from jmorl.learning.check import check_run
 from jmorl.loop import make_method
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
@@ -86,7 +86,7 @@ class RunFolder:
         """
         if path:
             check_free(path, force)
-        check_programs(environment, config.learning, envs.make_anew(config.env))
+        check_run(environment, config.learning, envs.make_anew(config.env))
         check_same(environment, envs.make(config.env), config.env)
         try:
             path = _made(path)

@@ -15,6 +15,7 @@ import numpy as np
 
 from envs.core import Environment
 from jmorl.config import Config
+from jmorl.learning.execution import own_settings
 from jmorl.learning.moppo import MOPPO
 from jmorl.loop import make_method
 from jmorl.methods.base import Method
@@ -77,7 +78,9 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
     Raises PackingError if its snapshots are not those of the train states that `config` describes.
     """
     document, arrays = packed.document, packed.arrays
-    train_state = jax.eval_shape(MOPPO(environment, config.ppo).initial_train_state, jax.eval_shape(jax.random.key, 0))
+    with own_settings():
+        key = jax.eval_shape(jax.random.key, 0)
+        train_state = jax.eval_shape(MOPPO(environment, config.ppo).initial_train_state, key)
     expected = _columns(train_state)
     if document["snapshot"] != expected:
         raise PackingError(f"it has train states of another shape: {_first_difference(document['snapshot'], expected)}")

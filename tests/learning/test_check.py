@@ -8,7 +8,7 @@ import pytest
 import envs
 from envs import NotAsDeclared
 from jmorl.cli import main
-from jmorl.learning.check import check_programs
+from jmorl.learning.check import check_run
 from jmorl.storage.run_folder import RunFolder
 from tests.probes import Ending, OneStep, ThreeWays
 
@@ -48,7 +48,7 @@ class Halfway(ThreeWays):
 
 
 def check(environment, config):
-    check_programs(environment, config.learning, envs.make_anew(config.env))
+    check_run(environment, config.learning, envs.make_anew(config.env))
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """A population is its agents, each as if it were alone, whatever the order and the number of devices."""
 
+from contextlib import nullcontext
+
 import jax
 import numpy as np
 import pytest
@@ -90,6 +92,8 @@ def test_in_float64_an_agent_the_order_and_the_devices_differ_by_rounding_alone(
     schedule = Schedule(np.int32(ITERATIONS), np.float64(RATE))
     config = CONFIG.replace(ppo={"hidden_sizes": (4,)})
     order = np.array([2, 0, 3, 1])
+    for module in ("execution", "check", "programs"):  # whose settings would be those of float32
+        monkeypatch.setattr(f"jmorl.learning.{module}.own_settings", nullcontext)
     with jax.enable_x64(True):
         programs, keys = Programs(ThreeWays(), config.learning), jax.random.split(jax.random.key(1), 4)
         start = jax.tree.map(in_float64, programs.initialize(jax.random.split(jax.random.key(0), 4)))
