@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from jmorl.learning.devices import usable_cores
 
 
@@ -34,3 +36,17 @@ def test_where_the_system_does_not_say_all_cores_of_the_machine_are_used(monkeyp
     assert usable_cores() == 12
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert usable_cores() == 1
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [("JAX_PLATFORMS", "nonsense"), ("JAX_NUM_CPU_DEVICES", "0"), ("JAX_NUM_CPU_DEVICES", "abc")],
+)
+def test_a_jax_that_cannot_work_is_said_and_nothing_is_made(variable, value, tmp_path):
+    environment = {**os.environ, variable: value}
+    command = [sys.executable, "-m", "jmorl", "train", "--out", str(tmp_path / "run")]
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith("jmorl: JAX cannot ") and value in line
+    assert not (tmp_path / "run").exists()
