@@ -5,10 +5,10 @@ import sys
 
 def main() -> int:
     """Run the command that the arguments say. Returns the exit code."""
-    try:
-        import jax  # noqa: F401
-    except Exception as error:  # it is not there, or a variable of its own has a value that it cannot read
-        print(f"jmorl: JAX cannot be imported: {error}", file=sys.stderr)
+    from jmorl.module_path import REFUSED
+
+    if REFUSED:
+        print(f"jmorl: JAX cannot be imported: {REFUSED}", file=sys.stderr)
         return 2
     from jmorl.cli import main
 

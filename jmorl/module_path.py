@@ -50,4 +50,8 @@ def _import_own_envs() -> None:
 
 
 _take_back_first_place()
-_import_own_envs()
+REFUSED: Exception | None = None  # why JAX cannot be imported, which the command line says
+try:
+    _import_own_envs()
+except (ValueError, RuntimeError) as error:  # a variable of JAX's own has a value that it cannot read
+    REFUSED = error

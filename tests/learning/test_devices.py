@@ -74,3 +74,17 @@ def test_without_a_place_for_it_there_is_no_cache(home, monkeypatch):
 def test_a_cache_folder_that_may_not_be_written_is_not_used(home, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     assert cache_folder() is None
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [("JAX_PLATFORMS", "nonsense"), ("JAX_NUM_CPU_DEVICES", "0"), ("JAX_NUM_CPU_DEVICES", "abc")],
+)
+def test_a_jax_that_cannot_work_is_said_and_nothing_is_made(variable, value, tmp_path):
+    environment = {**os.environ, variable: value}
+    command = [sys.executable, "-m", "jmorl", "train", "--out", str(tmp_path / "run")]
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith("jmorl: JAX cannot ") and value in line
+    assert not (tmp_path / "run").exists()
