@@ -170,8 +170,19 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     if kind in ("live", "lines"):
         megabytes, generations = folder_bytes(path) / 1e6, len(stored.metrics["generation"])
         size = f"{megabytes:.1f} MB, {megabytes / generations:.1f} for each generation"
+        _tell_of_reference(stored)
         where = f"Everything is in {path} ({size}), the chosen policy in {Layout(path).chosen}."
         console.print(where, soft_wrap=True)
+
+
+def _tell_of_reference(run: "StoredRun") -> None:
+    """Say which part of the front the hypervolume does not see, if there is one."""
+    if run.below_reference:
+        print(
+            f"{run.below_reference} of the {len(run.front)} policies of the front lie below the reference point "
+            f"{tuple(run.config.reference_point) or 'that the warm-up set'}, so the hypervolume does not count them; "
+            "--reference-point sets a lower one."
+        )
 
 
 def _kind_of_progress(options: argparse.Namespace, console: "PlainConsole") -> str:
@@ -360,6 +371,7 @@ def _show(options: argparse.Namespace) -> None:
     console = PlainConsole()
     for table in run_tables(stored):
         console.print(table)
+    _tell_of_reference(stored)
     for plot in draw_run(stored, Layout(options.run).plots):
         console.print(f"plot: {plot}", soft_wrap=True)
 

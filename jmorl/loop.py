@@ -13,6 +13,7 @@ import jax
 import numpy as np
 
 import envs
+from envs.checks import check_same
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
@@ -42,6 +43,7 @@ def run(
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
+    An `environment` that is not the config's is refused with NotAsDeclared.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, and AnswerError for an answer that its question does not allow;
     the events before it stand.
@@ -49,6 +51,7 @@ def run(
     environment = environment or envs.make(config.env)
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
     population = population or Population(environment, config.learning)
+    check_same(environment, envs.make(config.env), config.env)
     return _Run(config, environment, decision_maker, population).events(state)
 
 

@@ -16,7 +16,7 @@ from jmorl.learning.population import Population, TrainingFault
 from jmorl.loop import run
 from jmorl.search.bounds import lower_bounds, within
 from jmorl.search.policy import values_of
-from tests.probes import Faulty, ThreeWays
+from tests.probes import Faulty, Onwards, ThreeWays
 
 
 class Recorder(DecisionMaker):
@@ -220,6 +220,13 @@ def test_an_environment_that_is_not_as_it_declares_is_refused(small_config):
         ValueError, match=r"probe-three-ways is not as it declares: reward has shape \(2,\), not \(3,\)"
     ):
         next(run(small_config, Recorder(), Short()))
+
+
+def test_another_environment_than_the_configs_is_refused(small_config):
+    with pytest.raises(
+        ValueError, match=r"environment probe is not probe-three-ways, which the config names: objectives"
+    ):
+        next(run(small_config, Recorder(), Onwards()))
 
 
 def test_one_objective_is_nothing_to_choose_between(small_config):

@@ -84,6 +84,8 @@ class Lines(Watcher):
             f"front of {event.front.front_size}",
             f"hypervolume {number(event.front.hypervolume)}",
         ]
+        if event.front.below_reference:
+            facts.append(f"{event.front.below_reference} of the front below the reference point")
         if event.candidates == 1 and event.state.choice:
             facts.append("nothing but the choice itself within the bounds")
         if event.utility_max is not None:
@@ -107,7 +109,7 @@ class Json(Watcher):
         {"event": "generation", "generation": 0 is the warm-up, "generations": in the budget, "steps",
          "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",
          "policy_loss", "value_loss", "entropy", "approximate_kl", "bounds",
-         "front_size", "hypervolume", "expected_utility", "sparsity", "utility_max", "utility_mean",
+         "front_size", "hypervolume", "expected_utility", "sparsity", "below_reference", "utility_max", "utility_mean",
          "utility_mean_within_bounds", "prediction_error", "realized_change", "front": [policy, ...]}
         {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
          "bounds": that follow, "shown": how many policies, the fields of the answer ("stop", "generations": before the

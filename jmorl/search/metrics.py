@@ -21,12 +21,17 @@ class FrontMetrics:
     hypervolume: float  # above the run's reference point; of a large front approximate, see `pareto.hypervolume`
     expected_utility: float  # mean over an even grid of linear weights
     sparsity: float
+    below_reference: int  # members that are not above the reference point, and so add nothing to the hypervolume
 
 
 def front_metrics(values: np.ndarray, reference: np.ndarray, weights: np.ndarray) -> FrontMetrics:
     """Metrics of the front [N, M] with reference point [M] and the grid of weights [W, M]."""
     return FrontMetrics(
-        len(values), hypervolume(values, reference), expected_utility(values, weights), sparsity(values)
+        len(values),
+        hypervolume(values, reference),
+        expected_utility(values, weights),
+        sparsity(values),
+        int((values <= reference).any(axis=1).sum()),
     )
 
 

@@ -63,6 +63,12 @@ class StoredRun:
         return self.policies[self.result["chosen"]["policy"]] if self.result else None
 
     @property
+    def below_reference(self) -> int:
+        """How many members of the last front the hypervolume leaves out; 0 for runs of versions that do not say."""
+        counts = self.metrics.get("below_reference")
+        return 0 if counts is None or np.isnan(counts[-1]) else int(counts[-1])
+
+    @property
     def bounds(self) -> np.ndarray:
         """The bounds in each generation [G + 1, M], -inf where there were none."""
         columns = [self.metrics[f"bound_{objective.name}"] for objective in self.objectives]
