@@ -62,7 +62,7 @@ class Population:
         Raises TrainingFault, naming agents and objectives, if a return is not finite.
         """
         returns = self.programs.evaluate(train_states, keys)
-        faulty = ~np.isfinite(returns.undiscounted).all(1)  # [P, M]
+        faulty: np.ndarray = np.asarray(~np.isfinite(returns.undiscounted).all(1))  # [P, M]
         if faulty.any():
             names = [objective.name for objective in self.objectives]
             raise TrainingFault(
