@@ -343,6 +343,19 @@ def test_an_environment_that_has_become_another_is_refused_and_nothing_changed(c
     assert contents(copy) == before
 
 
+def test_a_run_of_before_actions_were_scaled_goes_on_only_where_that_changes_nothing(copy, tmp_path, monkeypatch):
+    manifest = json.loads((copy / "manifest.json").read_text(encoding="utf-8"))
+    (copy / "manifest.json").write_text(json.dumps(manifest | {"format": 1}), encoding="utf-8")
+    branch(copy, 1, tmp_path / "branch").folder.close()
+    resume(copy).folder.close()
+    monkeypatch.setattr(ThreeWays, "action_high", 2.0)
+    before = contents(copy)
+    for go_on_with in (lambda: resume(copy), lambda: branch(copy, 1, tmp_path / "other")):
+        with pytest.raises(CannotContinue, match="did not scale actions to the environment's bounds"):
+            go_on_with()
+    assert contents(copy) == before and not (tmp_path / "other").exists()
+
+
 def test_a_run_is_resumed_by_one_process_at_a_time(copy):
     with resume(copy).folder, pytest.raises(FolderInUse, match=f"is being written by process {os.getpid()}"):
         resume(copy)

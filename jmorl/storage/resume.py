@@ -78,6 +78,7 @@ def resume(path: Path, user: DecisionMaker | None = None) -> Continued:
         _tidy(path)
         raise ended
     environment = _environment(config)
+    _refuse_to_rescale(path, manifest, environment)
     user = user or _its_user(path, config, environment)
     with _locked(path) as lock:
         if Layout(path).result.exists():  # since it was looked for
@@ -106,6 +107,7 @@ def branch(path: Path, generation: int, out: Path, user: str | None = None, forc
     manifest, config = read_start(path)
     config = config.replace(user=user) if user else config
     environment = _environment(config)
+    _refuse_to_rescale(path, manifest, environment)
     decision_maker = _new_user(config, environment)
     checkpoint, state = state_after(path, generation, manifest, config, environment)
     state = replace(state, search=make_method(config, environment).asking_at_once(state.search))
@@ -130,6 +132,19 @@ def _environment(config: Config) -> Environment[Any]:
     environment = envs.make(config.env)
     check_run(environment, config.learning, envs.make_anew(config.env))
     return environment
+
+
+def _refuse_to_rescale(path: Path, manifest: Manifest, environment: Environment[Any]) -> None:
+    """Raise CannotContinue for a run whose networks put out actions in units that are scaled now.
+
+    Versions with format 1 clipped what a network puts out to the box, and did not scale it.
+    """
+    box = environment.action_box
+    if manifest["format"] == 1 and ((box.centre != 0).any() or (box.half_width != 1).any()):
+        raise CannotContinue(
+            f"the run in {path} is of a version that did not scale actions to the environment's bounds; its policies "
+            "can be shown, evaluated and exported, but their training cannot go on: start a new run"
+        )
 
 
 def _its_user(path: Path, config: Config, environment: Environment[Any]) -> DecisionMaker:
