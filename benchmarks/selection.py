@@ -11,10 +11,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from jmorl.config import SearchConfig
+from jmorl.display.console import PlainConsole
 from jmorl.search.metrics import front_metrics
 from jmorl.search.prediction import Records, predict
 from jmorl.search.selection import select_tasks
@@ -30,7 +30,7 @@ def main() -> None:
     for objectives in OBJECTIVES:
         weights, seconds = measured(objectives)
         shown.add_row(str(objectives), str(weights), *(f"{each:.2f}" for each in seconds))
-    Console().print(shown)
+    PlainConsole().print(shown)
 
 
 def measured(objectives: int) -> tuple[int, tuple[float, ...]]:

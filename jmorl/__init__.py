@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from jmorl.learning.population import TrainingFault
     from jmorl.loop import run
     from jmorl.methods.base import Method, PackedSearch, Problem, Prospect, Tasks
-    from jmorl.methods.registry import register as register_method
+    from jmorl.methods.registry import register_method
     from jmorl.search.policy import Policy
     from jmorl.state import RunState
     from jmorl.storage.policy_file import load_policy, save_policy
@@ -105,6 +105,7 @@ _HOMES = {
     "jmorl.learning.devices": "use_all_cpu_cores",
     "jmorl.learning.population": "TrainingFault",
     "jmorl.loop": "run",
+    "jmorl.methods.registry": "register_method",
     "jmorl.methods.base": "Method PackedSearch Problem Prospect Tasks",
     "jmorl.search.policy": "Policy",
     "jmorl.state": "RunState",
@@ -118,8 +119,6 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     """Return a public name, from its module; or a module, such as `jmorl.events`."""
-    if name == "register_method":
-        return importlib.import_module("jmorl.methods.registry").register
     for home, names in _HOMES.items():
         if name in names.split():
             return getattr(importlib.import_module(home), name)

@@ -17,6 +17,7 @@ import envs
 from jmorl import load_policy, read_run
 from jmorl.arguments import parse
 from jmorl.cli import _kind_of_progress, main
+from jmorl.config import resolve
 from jmorl.display.console import PlainConsole
 from jmorl.evaluation import evaluate_stored
 from jmorl.loop import evaluation_keys
@@ -426,6 +427,9 @@ def test_a_run_is_shown_on_any_machine(trained, tmp_path, variables):
     shutil.rmtree(folder / "plots")
     config = (folder / "config.toml").read_text(encoding="utf-8")
     (folder / "config.toml").write_text(config.replace("probe-three", "tests.registered:probe-three"), encoding="utf-8")
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    manifest["config"] = resolve(file=folder / "config.toml").identity()
+    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
     program = [sys.executable, "-m", "jmorl", "show", str(folder)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", **variables}
     shown = subprocess.run(program, env=environment, capture_output=True, cwd=tmp_path)

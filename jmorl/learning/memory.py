@@ -90,7 +90,7 @@ def machine_memory() -> int:
 def _group_limits(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path("/sys/fs/cgroup")) -> Iterator[int]:
     """Yield the limits of Linux control groups, in both versions: of this process's own and of those around it."""
     try:
-        lines = groups.read_text().splitlines()
+        lines = groups.read_text(encoding="utf-8").splitlines()
     except OSError:  # another system
         return
     for line in lines:
@@ -102,7 +102,7 @@ def _group_limits(groups: Path = Path("/proc/self/cgroup"), mounted: Path = Path
         for each in (folder, *folder.parents):
             if each.is_relative_to(root):
                 try:
-                    yield int((each / name).read_text())
+                    yield int((each / name).read_text(encoding="utf-8"))
                 except (OSError, ValueError):  # there is none, or it says "max"
                     continue
 

@@ -17,7 +17,7 @@ _registry: dict[str, "type[Method] | str"] = {
 }
 
 
-def register(name: str, method: "type[Method]") -> None:
+def register_method(name: str, method: "type[Method]") -> None:
     """Make a method available by a name. Raise ValueError if another method has it."""
     if _registry.setdefault(name, method) is not method:
         raise ValueError(f"method {name!r} is already registered")

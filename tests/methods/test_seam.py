@@ -38,7 +38,7 @@ class Duels(PGMORL):
         return replace(super().taken_in(run, offspring, tasks), silent_generations=0)
 
 
-registry.register("duels", Duels)
+registry.register_method("duels", Duels)
 
 
 class Judge(DecisionMaker):
@@ -111,7 +111,7 @@ def test_a_method_in_a_module_of_ones_own_is_found(small_config):
 
 def test_two_methods_cannot_have_one_name():
     with pytest.raises(ValueError, match="'duels' is already registered"):
-        registry.register("duels", PGMORL)
+        registry.register_method("duels", PGMORL)
 
 
 def test_a_newcomers_method_is_a_short_file():
