@@ -337,13 +337,15 @@ def _fault(
 ) -> tuple[jax.Array, jax.Array]:
     """Return the first cause, in the order in which one would bring about the next, of numbers that are not finite.
 
-    With it comes the first component in which it is found.
+    With it comes the first component in which it is found, in the first step in which it is: an action that follows
+    from it breaks the others.
     """
 
-    def broken(numbers: jax.Array) -> jax.Array:  # [E, T, N] -> [N]
-        return ~jnp.isfinite(numbers).all((0, 1))
+    def broken(*numbers: jax.Array) -> jax.Array:  # [E, T, N] each -> [N]
+        steps = jnp.stack([~jnp.isfinite(each).all(0) for each in numbers]).any(0)  # [T, N]
+        return steps[steps.any(1).argmax()]
 
-    observation = broken(trajectory.observation) | broken(trajectory.final_observation)
+    observation = broken(trajectory.observation, trajectory.final_observation)
     reward = broken(trajectory.reward)
     losses = (parameters, diagnostics.policy_loss, diagnostics.value_loss)
     loss = jnp.stack([~jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(losses)])

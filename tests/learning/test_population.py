@@ -92,7 +92,7 @@ def test_in_float64_an_agent_the_order_and_the_devices_differ_by_rounding_alone(
     schedule = Schedule(np.int32(ITERATIONS), np.float64(RATE))
     config = CONFIG.replace(ppo={"hidden_sizes": (4,)})
     order = np.array([2, 0, 3, 1])
-    for module in ("execution", "check", "programs"):  # whose settings would be those of float32
+    for module in ("execution", "programs"):  # whose settings would be those of float32
         monkeypatch.setattr(f"jmorl.learning.{module}.own_settings", nullcontext)
     with jax.enable_x64(True):
         programs, keys = Programs(ThreeWays(), config.learning), jax.random.split(jax.random.key(1), 4)
