@@ -30,9 +30,10 @@ __all__ = [
     "make",
     "plain_id",
     "register",
+    "registry",
 ]
 
-_registry: dict[str, Callable[..., Environment[Any]]] = {}
+registry: dict[str, Callable[..., Environment[Any]]] = {}  # what `register` fills: factories by id
 _made: dict[
     Hashable, Environment[Any]
 ] = {}  # by factory and options: they hold no state, and programs are kept for each
@@ -43,7 +44,7 @@ def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
 
     Raises ValueError if the id is taken by another factory.
     """
-    if _registry.setdefault(id, factory) is not factory:
+    if registry.setdefault(id, factory) is not factory:
         raise ValueError(f"environment id {id!r} is already registered")
 
 
@@ -57,10 +58,10 @@ def make(id: str, **options: Any) -> Environment[Any]:
     module, name, written = _parts(id)
     if module:
         _import(id, module)
-    if name not in _registry:
+    if name not in registry:
         known = f"known: {', '.join(ids())}{did_you_mean(nearest(name, ids()))}"
         raise ValueError(f"unknown environment {name!r}; {known}{_hidden(module)}")
-    factory, options = _registry[name], written | options
+    factory, options = registry[name], written | options
     _check_options(name, factory, options)
     key = (factory, *sorted(options.items()))
     if key not in _made:
@@ -83,12 +84,12 @@ def make_anew(id: str) -> Environment[Any]:
     """Return another instance of what `make(id)` returns, to compare with. Raises ValueError as `make` does."""
     module, name, written = _parts(id)
     make(id)  # which imports and checks
-    return _new(name, _registry[name], written)
+    return _new(name, registry[name], written)
 
 
 def ids() -> list[str]:
     """All registered environment ids, sorted."""
-    return sorted(_registry)
+    return sorted(registry)
 
 
 def plain_id(id: str) -> str:

@@ -25,7 +25,6 @@ from jmorl.signals import Interrupted, StopSignals
 from jmorl.storage.layout import Layout
 
 if TYPE_CHECKING:
-    from jmorl.display.console import PlainConsole
     from jmorl.storage.resume import Continued
     from jmorl.storage.stored_run import StoredRun
     from jmorl.studio.session import Session
@@ -134,14 +133,14 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     from jmorl.display.console import PlainConsole
     from jmorl.events import RunFinished
     from jmorl.learning.execution import ComputationFailed
-    from jmorl.report.progress import watcher
+    from jmorl.report.progress import kind_of_progress, watcher
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.run_folder import folder_bytes
     from jmorl.storage.stored_run import read_run
     from jmorl.units import measured_in
 
     console = PlainConsole()
-    kind = _kind_of_progress(options, console)
+    kind = kind_of_progress(options.json, options.quiet, console)
     for note in continued.notes:
         print(f"jmorl: {note}", file=sys.stderr)
     path, config = continued.folder.path, continued.folder.config
@@ -183,13 +182,6 @@ def _tell_of_reference(run: "StoredRun") -> None:
             f"{tuple(run.config.reference_point) or 'that the warm-up set'}, so the hypervolume does not count them; "
             "--reference-point sets a lower one."
         )
-
-
-def _kind_of_progress(options: argparse.Namespace, console: "PlainConsole") -> str:
-    """How the run is shown, as `watcher` takes it. A terminal that cannot move its cursor gets lines."""
-    if options.json or options.quiet:
-        return "json" if options.json else "quiet"
-    return "live" if console.is_terminal and not console.is_dumb_terminal else "lines"
 
 
 def _draw(run: "StoredRun") -> None:

@@ -62,16 +62,16 @@ WITHOUT_EFFECT = frozenset({"checkpoints.keep"})  # on results
 
 def identity(settings: Mapping[str, Any]) -> str:
     """Return the hash of nested settings, as JSON has them, without those that do not change results."""
-    flat = dict(_flat(settings))
+    flat = dict(flat_settings(settings))
     return _digest({name: flat[name] for name in flat.keys() - WITHOUT_EFFECT if flat[name] != BASELINE[name]})
 
 
 def identity_of_format_1(settings: Mapping[str, Any]) -> str | None:
     """Return what format 1 had instead, a hash of every setting; None for settings it could not have had."""
-    flat = dict(_flat(settings))
+    flat = dict(flat_settings(settings))
     if any(flat[name] != BASELINE[name] for name in ADDED_SINCE_FORMAT_1):
         return None
-    return _digest(_nested({name: flat[name] for name in flat.keys() - ADDED_SINCE_FORMAT_1}))
+    return _digest(_nested_settings({name: flat[name] for name in flat.keys() - ADDED_SINCE_FORMAT_1}))
 
 
 def format_of(settings: Mapping[str, Any]) -> int | None:
@@ -81,27 +81,28 @@ def format_of(settings: Mapping[str, Any]) -> int | None:
     """
     if isinstance(settings.get("format"), int):
         return int(settings["format"])
-    return 1 if dict(_flat(settings)).keys() >= BASELINE.keys() - ADDED_SINCE_FORMAT_1 else None
+    return 1 if dict(flat_settings(settings)).keys() >= BASELINE.keys() - ADDED_SINCE_FORMAT_1 else None
 
 
 def before_settings_were_added() -> dict[str, Any]:
     """Return what a file of an earlier format means where it says nothing, as nested settings."""
-    return _nested(BASELINE)
+    return _nested_settings(BASELINE)
 
 
 def _digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _flat(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Give each setting with its name and the sections it is in, as "ppo.epochs"."""
     for name, value in settings.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}.")
+            yield from flat_settings(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 
 
-def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+def _nested_settings(flat: Mapping[str, Any]) -> dict[str, Any]:
     nested: dict[str, Any] = {}
     for name, value in flat.items():
         *sections, last = name.split(".")

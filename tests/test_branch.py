@@ -109,7 +109,7 @@ def test_a_checkpoint_that_does_not_fit_its_environment_is_not_branched_off(whol
         def observe(self, state):
             return jnp.append(state, 0.0)
 
-    monkeypatch.setattr(envs, "_registry", {ThreeWays.id: Wider})
+    monkeypatch.setitem(envs.registry, ThreeWays.id, Wider)
     with pytest.raises(CannotContinue, match="00001 does not fit this jmorl: it has train states of another shape"):
         branch(whole, 1, tmp_path / "new")
     assert not (tmp_path / "new").exists()

@@ -15,12 +15,12 @@ import pytest
 
 import envs
 from jmorl import load_policy, read_run
-from jmorl.arguments import parse
-from jmorl.cli import _kind_of_progress, main
+from jmorl.cli import main
 from jmorl.config import resolve
 from jmorl.display.console import PlainConsole
 from jmorl.evaluation import evaluate_stored
 from jmorl.loop import evaluation_keys
+from jmorl.report.progress import kind_of_progress
 from tests.studio.serving import free_port
 
 ROOT = Path(__file__).parent.parent
@@ -237,7 +237,7 @@ envs.register("single-v0", Single)
 @pytest.fixture
 def bad_environments(tmp_path, monkeypatch):
     """Those of a module `my_bad` in the working directory."""
-    monkeypatch.setattr(envs, "_registry", dict(envs._registry))
+    monkeypatch.setattr(envs, "registry", dict(envs.registry))
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.delitem(sys.modules, "my_bad", raising=False)
     (tmp_path / "my_bad.py").write_text(BAD)
@@ -400,17 +400,17 @@ def test_commands_in_messages_can_be_pasted_into_a_shell(folder, capsys):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "term", "kind"),
+    ("options", "term", "kind"),
     [
-        ([], "xterm", "live"),
-        ([], "dumb", "lines"),
-        (["--quiet"], "xterm", "quiet"),
-        (["--json"], "dumb", "json"),
+        ({}, "xterm", "live"),
+        ({}, "dumb", "lines"),
+        ({"quiet": True}, "xterm", "quiet"),
+        ({"json": True}, "dumb", "json"),
     ],
 )
-def test_a_terminal_that_cannot_move_its_cursor_gets_lines(arguments, term, kind):
+def test_a_terminal_that_cannot_move_its_cursor_gets_lines(options, term, kind):
     console = PlainConsole(force_terminal=True, _environ={"TERM": term})
-    assert _kind_of_progress(parse(["train", *arguments]), console) == kind
+    assert kind_of_progress(**{"json": False, "quiet": False, **options}, console=console) == kind
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ FORMAT_1_PAPER = "fbdcd9303d5a0ae3"  # of `resolve("paper", overrides={"env": "m
 
 
 def test_the_baseline_has_every_setting_and_no_other():
-    assert dict(config_format._flat(Config().model_dump(mode="json"))).keys() == config_format.BASELINE.keys()
+    assert dict(config_format.flat_settings(Config().model_dump(mode="json"))).keys() == config_format.BASELINE.keys()
 
 
 def test_the_baseline_is_a_config_without_differences():

@@ -62,9 +62,8 @@ def test_a_signal_while_somebody_is_asked_does_not_wait_for_an_answer(small_conf
         os.kill(os.getpid(), signal.SIGTERM)
         raise AssertionError("the question was not broken off")
 
-    monkeypatch.setattr("builtins.input", never)
     with monkeypatch.context() as patch:
-        patch.setattr("jmorl.decision.terminal.TerminalUser.__init__.__defaults__", (None, never))
+        patch.setattr("builtins.input", never)
         assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 143
     assert (path / "checkpoints" / "00000").exists() and not (path / "decisions.jsonl").exists()
 

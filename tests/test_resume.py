@@ -274,13 +274,13 @@ def test_a_run_that_has_lost_its_config_is_not_overwritten(copy, small_config):
 
 def test_a_run_that_ends_while_another_process_takes_it_up_is_left_alone(copy, whole, monkeypatch):
     """Its result appears after it was looked for, and before it was locked."""
-    locked = RESUME._locked
+    lock = RESUME.RunLock
 
     def ended(path):
         shutil.copyfile(whole / "result.json", path / "result.json")
-        return locked(path)
+        return lock(path)
 
-    monkeypatch.setattr(RESUME, "_locked", ended)
+    monkeypatch.setattr(RESUME, "RunLock", ended)
     with pytest.raises(AlreadyFinished):
         resume(copy)
     assert outcome(copy) == outcome(whole)
@@ -337,7 +337,7 @@ def test_an_environment_that_has_become_another_is_refused_and_nothing_changed(c
             return result._replace(reward=result.reward[:2])
 
     before = contents(copy)
-    monkeypatch.setattr(envs, "_registry", {ThreeWays.id: Short})
+    monkeypatch.setitem(envs.registry, ThreeWays.id, Short)
     with pytest.raises(NotAsDeclared, match="reward has shape"):
         resume(copy)
     assert contents(copy) == before

@@ -40,9 +40,9 @@ class TerminalUser(DecisionMaker):
     choice to end the run with.
     """
 
-    def __init__(self, console: PlainConsole | None = None, read: Callable[[str], str] = input):
+    def __init__(self, console: PlainConsole | None = None, read: Callable[[str], str] | None = None):
         self.console = console or PlainConsole()
-        self.read = read
+        self.read = read or input
 
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""

@@ -9,6 +9,13 @@ from jmorl.report.live import LiveView
 from jmorl.report.watchers import Json, Lines, Quiet, Watcher
 
 
+def kind_of_progress(json: bool, quiet: bool, console: PlainConsole) -> str:
+    """Return how a run is shown, as `watcher` takes it. A terminal that cannot move its cursor gets lines."""
+    if json or quiet:
+        return "json" if json else "quiet"
+    return "live" if console.is_terminal and not console.is_dumb_terminal else "lines"
+
+
 def watcher(kind: str, config: Config, objectives: tuple[Objective, ...], console: PlainConsole) -> Watcher:
     """Return who shows the events of a run, each given to its `show`, within a `with` block.
 

@@ -282,7 +282,7 @@ def test_what_a_function_raises_is_one_line_with_advice_and_place(breaks, messag
 )
 def test_a_declaration_that_cannot_be_is_refused_when_it_is_made(monkeypatch, changes, message):
     made = type("Made", (ThreeWays,), {"id": "made-v0", **changes})
-    monkeypatch.setattr(envs, "_registry", {"made-v0": made})
+    monkeypatch.setitem(envs.registry, "made-v0", made)
     with pytest.raises(NotAsDeclared, match=f"environment made-v0 declares what cannot be: .*{message}"):
         envs.make("made-v0")
     with pytest.raises(NotAsDeclared, match=message):

@@ -64,7 +64,7 @@ def test_options_that_an_environment_needs_are_named(monkeypatch):
         def __init__(self, size, colour, wind="none"):
             self.made = size, colour, wind
 
-    monkeypatch.setattr(envs, "_registry", {"sized": Sized})
+    monkeypatch.setitem(envs.registry, "sized", Sized)
     with pytest.raises(ValueError, match="environment 'sized' needs size, colour: write sized,size=VALUE,colour=VALUE"):
         envs.make("sized")
     with pytest.raises(ValueError, match="environment 'sized' needs colour"):
@@ -76,13 +76,13 @@ def test_an_environment_that_cannot_be_made_is_named(monkeypatch):
     class Unfinished(envs.Environment):
         id = "unfinished"
 
-    monkeypatch.setattr(envs, "_registry", {"unfinished": Unfinished})
+    monkeypatch.setitem(envs.registry, "unfinished", Unfinished)
     with pytest.raises(ValueError, match="environment 'unfinished' cannot be made: TypeError: .*abstract.*transition"):
         envs.make("unfinished")
 
 
 def test_an_environment_that_ends_the_program_when_it_is_made_is_named(monkeypatch):
-    monkeypatch.setattr(envs, "_registry", {"ending": lambda: sys.exit("no licence")})
+    monkeypatch.setitem(envs.registry, "ending", lambda: sys.exit("no licence"))
     with pytest.raises(ValueError, match="environment 'ending' cannot be made: SystemExit: no licence; it ends the"):
         envs.make("ending")
 
@@ -92,7 +92,7 @@ def test_options_reach_the_factory_from_the_id_and_from_the_call(monkeypatch):
         def __init__(self, size="1", colour="red"):
             self.made = size, colour
 
-    monkeypatch.setattr(envs, "_registry", {"sized": Sized})
+    monkeypatch.setitem(envs.registry, "sized", Sized)
     assert envs.make("sized").made == ("1", "red")
     assert envs.make("tests:sized,size=3").made == ("3", "red")
     assert envs.make("sized,size=3,colour=blue", size="4").made == ("4", "blue")

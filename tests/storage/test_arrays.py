@@ -6,8 +6,8 @@ import tempfile
 
 import numpy as np
 import pytest
+from orbax.checkpoint import PyTreeCheckpointer
 
-from jmorl.storage import arrays
 from jmorl.storage.arrays import ArraysError, read_arrays, write_arrays
 
 ARRAYS = {"x": np.arange(6.0).reshape(2, 3), "y": np.arange(3, dtype=np.uint32), "z": np.array([np.nan, -0.0], "f4")}
@@ -66,26 +66,31 @@ def test_what_orbax_cannot_read_is_an_error_in_one_line(tmp_path):
 
 @pytest.mark.parametrize("change", [lambda found: found.pop("y"), lambda found: found["x"].__setitem__((0, 0), 7.0)])
 def test_arrays_are_compared_with_what_was_written_before_anybody_relies_on_them(tmp_path, monkeypatch, change):
-    load = arrays._load
+    restore = PyTreeCheckpointer.restore
 
-    def differently(path):
-        found = {name: array.copy() for name, array in load(path).items()}
+    def differently(checkpointer, path):
+        found = {name: array.copy() for name, array in restore(checkpointer, path).items()}
         change(found)
         return found
 
-    monkeypatch.setattr(arrays, "_load", differently)
+    monkeypatch.setattr(PyTreeCheckpointer, "restore", differently)
     with pytest.raises(ArraysError, match="what was written is not what was read back"):
         write_arrays(tmp_path / "arrays", ARRAYS)
 
 
-def test_only_orbax_is_quiet_and_only_meanwhile(caplog):
-    logger = logging.getLogger("absl")
+def test_only_orbax_is_quiet_and_only_meanwhile(tmp_path, monkeypatch, caplog):
+    restore, logger = PyTreeCheckpointer.restore, logging.getLogger("absl")
 
     def report(path):
         logger.handle(logger.makeRecord("absl", logging.ERROR, path, 1, path, (), None))
 
-    with arrays._quiet():
+    def reporting(checkpointer, path):
         report("/packages/orbax/checkpoint/futures.py")
         report("/packages/flax/core.py")
+        return restore(checkpointer, path)
+
+    write_arrays(tmp_path / "arrays", ARRAYS)
+    monkeypatch.setattr(PyTreeCheckpointer, "restore", reporting)
+    read_arrays(tmp_path / "arrays")
     report("/packages/orbax/later.py")
     assert [record.pathname for record in caplog.records] == ["/packages/flax/core.py", "/packages/orbax/later.py"]

@@ -161,10 +161,11 @@ def test_runs_that_begin_in_the_same_second_get_the_next_free_names(tmp_path, mo
 def test_bad_input_reserves_no_name(tmp_path, monkeypatch, small_config):
     monkeypatch.chdir(tmp_path)
 
-    def refuse(environment):
-        raise NotAsDeclared("not as it says")
+    class Short(ThreeWays):
+        def transition(self, state, action):
+            result = super().transition(state, action)
+            return result._replace(reward=result.reward[:2])
 
-    monkeypatch.setattr("jmorl.storage.run_folder.check_environment", refuse)
-    with pytest.raises(NotAsDeclared):
-        RunFolder.create(None, small_config, envs.make(small_config.env))
+    with pytest.raises(NotAsDeclared, match="reward has shape"):
+        RunFolder.create(None, small_config, Short())
     assert not list(tmp_path.iterdir())
