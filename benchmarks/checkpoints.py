@@ -18,12 +18,13 @@ from typing import Any
 
 from rich.table import Table
 
+import envs
 from benchmarks.speed import machine
 from jmorl.config import Config, resolve
 from jmorl.display.console import PlainConsole
 from jmorl.events import GenerationFinished
 from jmorl.learning.devices import use_all_cpu_cores
-from jmorl.loop import run
+from jmorl.loop import make_method, run
 from jmorl.report.timeline import Timeline
 from jmorl.search.archive import Archive
 from jmorl.state import RunState
@@ -52,7 +53,8 @@ def cost(env: str, generations: int) -> dict[str, Any]:
     policies = config.population.agents * (Timeline(config, since=0.0).generations + 1)
     timed, state = _timed_generations(config, generations)
     with tempfile.TemporaryDirectory() as folder:
-        writer = CheckpointWriter(Path(folder), "benchmark", keep=1)
+        method = make_method(config, envs.make(env))
+        writer = CheckpointWriter(Path(folder), "benchmark", keep=1, method=method)
         states = [_grown(state, policies, state.generation + more) for more in range(REPEATS)]
         written = [_timed_checkpoint(writer, each) for each in states]
         writer.close()
@@ -93,8 +95,8 @@ def _grown(state: RunState, policies: int, generation: int) -> RunState:
     """Return the state with so many policies in archive and buffer."""
     members = state.archive.members
     copies = tuple(replace(members[index % len(members)], id=index) for index in range(policies))
-    buffer = replace(state.buffer, members=copies)
-    return replace(state, archive=Archive(copies), buffer=buffer, choice=None, generation=generation)
+    search = replace(state.search, buffer=replace(state.search.buffer, members=copies))
+    return replace(state, archive=Archive(copies), search=search, choice=None, generation=generation)
 
 
 def _clocks() -> Times:

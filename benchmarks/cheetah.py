@@ -72,7 +72,7 @@ def _judged(record: RunRecord) -> dict[str, Any]:
     steps = USER_STEPS[CHEETAH]
     utilities = [greatest_utility(record, weights, steps).round(1).tolist() for weights in USERS.values()]
     reference = np.array(record.config["reference_point"])
-    curve = []
+    curve: list[dict[str, Any]] = []
     for number in range(generations_within(record, steps)):
         values = record.values[list(record.generations[number].front)]
         point = {

@@ -46,7 +46,8 @@ def waited(folder: Path, flags: list[str]) -> dict[str, float]:
     """Seconds to each thing that a user sees of the demo; in the folder are its run and what was compiled before."""
     train, *others = commands(folder / "run")
     environment = {**os.environ, "JAX_COMPILATION_CACHE_DIR": str(folder / "jax")}
-    started, seconds = time.perf_counter(), {}
+    started = time.perf_counter()
+    seconds: dict[str, float] = {}
     with subprocess.Popen([*train, *flags, "--json"], cwd=HERE.parent, env=environment, stdout=subprocess.PIPE) as demo:
         assert demo.stdout is not None
         for line in demo.stdout:

@@ -88,7 +88,7 @@ def _play(value: jax.Array, weight: jax.Array, starts: jax.Array, grid: Grid) ->
         force = jax.vmap(best_force)(state)
         outcome = jax.vmap(ENVIRONMENT.transition)(state, force[:, None])
         reward = jnp.where(running[:, None], outcome.reward, 0.0)
-        return outcome.state, running & ~outcome.terminated, reward, force
+        return outcome.state, running & ~jnp.asarray(outcome.terminated), reward, force
 
     def stay(state: CarState, running: jax.Array) -> tuple[CarState, jax.Array, jax.Array, jax.Array]:
         return state, running, jnp.zeros((*running.shape, 2)), jnp.zeros(running.shape)

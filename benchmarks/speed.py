@@ -223,7 +223,7 @@ def peer(env: str) -> dict[str, Any]:
         "--discount": config.ppo.discount,
     }
     flags = [str(part) for flag in sizes.items() for part in flag]
-    command = [PEER_PYTHON, HERE / "peer" / "pgmorl.py", *flags]
+    command = [str(PEER_PYTHON), str(HERE / "peer" / "pgmorl.py"), *flags]
     result: dict[str, Any] = json.loads(
         subprocess.run(command, check=True, capture_output=True, encoding="utf-8").stdout
     )

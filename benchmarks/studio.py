@@ -29,8 +29,8 @@ from benchmarks.speed import machine
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
 from jmorl.display.console import PlainConsole
+from jmorl.methods.base import Prospect
 from jmorl.search.policy import Policy
-from jmorl.state import Prospect
 from jmorl.storage.layout import Layout
 from jmorl.storage.stored_run import read_run
 from jmorl.studio.session import Session

@@ -102,7 +102,7 @@ def _play(environment: MountainCar, forces: jax.Array, start: jax.Array) -> tupl
 
     def step(state: CarState, force: jax.Array) -> tuple[CarState, tuple[jax.Array, jax.Array]]:
         outcome = environment.transition(state, force[None])
-        return outcome.state, (outcome.reward, outcome.terminated)
+        return outcome.state, (outcome.reward, jnp.asarray(outcome.terminated))
 
     return jax.lax.scan(step, CarState(start, jnp.zeros_like(start)), forces)[1]
 

@@ -6,7 +6,7 @@ import sys
 import jax
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageSequence
 
 import envs
 from envs.mountain_car import CarState
@@ -67,7 +67,7 @@ def test_a_recording_may_stop_before_the_end(policy):
 @pytest.fixture
 def ending(monkeypatch, tmp_path):
     """A policy where episodes end after 1 to 2500 steps, and the limit is too far to be computed."""
-    monkeypatch.setitem(envs._registry, Ending.id, Ending)
+    monkeypatch.setitem(envs.registry, Ending.id, Ending)
     return stored_linear_policy(tmp_path / "ending.npz", f"{Ending.id},limit=2000000000,most=2500", [[0.5]])
 
 
@@ -84,7 +84,7 @@ def test_a_recording_ends_with_its_episode_however_far_the_limit_is(ending):
 
 
 def test_recording_and_score_use_the_policys_own_box(monkeypatch, tmp_path):
-    monkeypatch.setitem(envs._registry, Share.id, Share)
+    monkeypatch.setitem(envs.registry, Share.id, Share)
     policy = stored_linear_policy(tmp_path / "share.npz", f"{Share.id},low=5,high=35", [[0.0]])
     assert policy([0.0]) == 20
     expected = [-(0.25**2), -0.025]  # the middle, for one step
@@ -99,9 +99,8 @@ def test_play_makes_an_animation_with_a_picture_for_each_step(policy_path, tmp_p
     with Image.open(out) as film:
         assert film.size[0] == 200
         durations = []
-        for index in range(film.n_frames):
-            film.seek(index)
-            durations.append(film.info["duration"])
+        for frame in ImageSequence.Iterator(film):
+            durations.append(frame.info["duration"])
     assert len(durations) == 13
     assert set(durations[:-1]) == {30} and durations[-1] == 30 * 30  # the last stays for a second
 

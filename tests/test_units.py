@@ -1,6 +1,9 @@
 """Paper units: MO-Gymnasium's own wrappers, chained as the authors do, give the same numbers."""
 
+from typing import Any
+
 import gymnasium
+import jax
 import numpy as np
 import pytest
 from mo_gymnasium.wrappers import MOClipReward, MONormalizeReward
@@ -35,7 +38,8 @@ class Replay(gymnasium.Env):
 
 def wrapped_scores(episodes, objectives):
     """The discounted returns [N, M] of the episodes behind the real wrappers, and the last deviations [M]."""
-    environment, normalisers = Replay(episodes), []
+    environment: Any = Replay(episodes)
+    normalisers: list[Any] = []
     for index in range(objectives):
         environment = MONormalizeReward(environment, idx=index, gamma=SCALE_GAMMA)
         normalisers.append(environment)
@@ -71,10 +75,7 @@ def as_returns(episodes, agents):
     lengths = np.array([len(rewards) for rewards, _ in episodes])
     flat = EpisodeReturns(padded.sum(1), padded.sum(1), lengths, Trace(padded, terminated))
     shape = (agents, len(episodes) // agents)
-    return EpisodeReturns(
-        *(part.reshape(*shape, *part.shape[1:]) for part in flat[:3]),
-        Trace(*(part.reshape(*shape, *part.shape[1:]) for part in flat.trace)),
-    )
+    return jax.tree.map(lambda part: part.reshape(*shape, *part.shape[1:]), flat)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -45,10 +45,11 @@ def test_numpy_computes_the_same():
 
 
 @pytest.mark.parametrize(
-    "bounds", [(-2, 3), np.float32([-2, 3]), ([-2, -2], [3, 3]), (np.full(2, -2.0), jnp.full(2, 3.0)), ((-2, -2), 3)]
+    ("low", "high"),
+    [(-2, 3), np.float32([-2, 3]), ([-2, -2], [3, 3]), (np.full(2, -2.0), jnp.full(2, 3.0)), ((-2, -2), 3)],
 )
-def test_bounds_are_numbers_of_any_kind(bounds):
-    box = action_box(*bounds, 2)
+def test_bounds_are_numbers_of_any_kind(low, high):
+    box = action_box(low, high, 2)
     for field, expected in {"low": -2, "high": 3, "centre": 0.5, "half_width": 2.5}.items():
         value = getattr(box, field)
         assert value.dtype == np.float32

@@ -1,5 +1,7 @@
 """The adapter: Gymnasium's own checker, and the same episode as without it."""
 
+from typing import Any
+
 import gymnasium
 import jax
 import jax.numpy as jnp
@@ -56,7 +58,7 @@ def test_a_step_before_the_first_reset_is_refused():
 
 
 def test_the_action_space_is_the_box():
-    space = GymnasiumEnvironment(UnevenBox()).action_space
+    space: Any = GymnasiumEnvironment(UnevenBox()).action_space
     np.testing.assert_array_equal(space.low, np.float32([5, -0.5]))
     np.testing.assert_array_equal(space.high, np.float32([35, np.inf]))
     assert space.dtype == np.float32

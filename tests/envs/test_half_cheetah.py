@@ -133,6 +133,7 @@ def test_the_model_is_gymnasiums_file():
 
 def test_physics_is_an_option_of_the_id():
     for environment in (envs.make(ID, physics="mjx"), envs.make(f"{ID},physics=mjx")):
+        assert isinstance(environment, HalfCheetah)
         assert type(environment.physics).__name__ == "MjxPhysics"
     with pytest.raises(ValueError, match="physics must be planar or mjx, not 'bullet'"):
         envs.make(f"{ID},physics=bullet")

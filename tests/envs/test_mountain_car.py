@@ -1,5 +1,7 @@
 """The mountain car against MO-Gymnasium's, one step from each of many states, walls and goal edge included."""
 
+from typing import Any
+
 import gymnasium
 import jax
 import jax.numpy as jnp
@@ -32,7 +34,7 @@ def cases():
 @pytest.fixture(scope="module")
 def reference(cases):
     """MO-Gymnasium's answers from the same states."""
-    real = mo_gymnasium.make(ID).unwrapped
+    real: Any = mo_gymnasium.make(ID).unwrapped
     real.reset(seed=0)
     rows = []
     for position, velocity, action in zip(*cases, strict=True):

@@ -59,6 +59,11 @@ def test_a_module_that_breaks_down_is_named_with_the_line(tmp_path, monkeypatch,
         envs.make("broken_envs:x")
 
 
+def made(id, **options):
+    """Return the options that reached an environment of these tests."""
+    return vars(envs.make(id, **options))["made"]
+
+
 def test_options_that_an_environment_needs_are_named(monkeypatch):
     class Sized(MountainCar):
         def __init__(self, size, colour, wind="none"):
@@ -69,7 +74,7 @@ def test_options_that_an_environment_needs_are_named(monkeypatch):
         envs.make("sized")
     with pytest.raises(ValueError, match="environment 'sized' needs colour"):
         envs.make("sized,size=3")
-    assert envs.make("sized,size=3,colour=blue").made == ("3", "blue", "none")
+    assert made("sized,size=3,colour=blue") == ("3", "blue", "none")
 
 
 def test_an_environment_that_cannot_be_made_is_named(monkeypatch):
@@ -93,9 +98,9 @@ def test_options_reach_the_factory_from_the_id_and_from_the_call(monkeypatch):
             self.made = size, colour
 
     monkeypatch.setitem(envs.registry, "sized", Sized)
-    assert envs.make("sized").made == ("1", "red")
-    assert envs.make("tests:sized,size=3").made == ("3", "red")
-    assert envs.make("sized,size=3,colour=blue", size="4").made == ("4", "blue")
+    assert made("sized") == ("1", "red")
+    assert made("tests:sized,size=3") == ("3", "red")
+    assert made("sized,size=3,colour=blue", size="4") == ("4", "blue")
 
 
 @pytest.mark.parametrize("id", ["a-v0", "module.sub:a-v0", "a-v0,x=1", "module:a-v0,x=1,y=m:2"])

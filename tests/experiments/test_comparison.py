@@ -78,13 +78,13 @@ def test_all_that_is_wrong_is_said_before_anything_is_made(contenders, tmp_path)
 
 
 def test_nothing_to_compare_is_refused(contenders, tmp_path):
-    for arguments, missing in (
-        (({}, TARGETS, (1,)), "contender"),
-        ((contenders, {}, (1,)), "target"),
-        ((contenders, TARGETS, ()), "seed"),
+    for methods, targets, seeds, missing in (
+        ({}, TARGETS, (1,), "contender"),
+        (contenders, {}, (1,), "target"),
+        (contenders, TARGETS, (), "seed"),
     ):
         with pytest.raises(ConfigError, match=f"there is no {missing} to compare with"):
-            compare(ThreeWays.id, *arguments, tmp_path / "out")
+            compare(ThreeWays.id, methods, targets, seeds, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

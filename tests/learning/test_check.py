@@ -57,7 +57,7 @@ def registered(monkeypatch, small_config):
 
     def register(factory, id=None):
         id = id or factory.id
-        monkeypatch.setitem(envs._registry, id, factory)
+        monkeypatch.setitem(envs.registry, id, factory)
         objectives = len(envs.make(id).objectives)
         weights = ",".join(["1"] * objectives)
         return small_config.replace(env=id, user=f"weights={weights}")

@@ -119,5 +119,8 @@ def test_scalarising_before_or_after_is_the_same():
     weights = np.array([0.3, 0.7])
     ends = g["terminated"], g["truncated"], g["discount"], g["lambda"]
     after = generalized_advantages(g["rewards"], g["values"], g["successor_values"], *ends) @ weights
-    scalar = [(g[name] @ weights)[:, None] for name in ("rewards", "values", "successor_values")]
-    np.testing.assert_allclose(generalized_advantages(*scalar, *ends)[:, 0], after, rtol=1e-12)
+    rewards, values, successor_values = (
+        (g[name] @ weights)[:, None] for name in ("rewards", "values", "successor_values")
+    )
+    before = generalized_advantages(rewards, values, successor_values, *ends)[:, 0]
+    np.testing.assert_allclose(before, after, rtol=1e-12)

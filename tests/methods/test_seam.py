@@ -68,10 +68,10 @@ def test_questions_of_other_kinds_are_asked_answered_and_counted(config):
     events = list(run(config, judge))
     decided = [event for event in events if isinstance(event, Decided)]
     assert isinstance(decided[0].question, WeightQuestion) and decided[0].answer == (0.75, 0.25, 0.0)
-    pairs = [event for event in decided if isinstance(event.question, PairQuestion)]
+    pairs = [(event, event.question) for event in decided if isinstance(event.question, PairQuestion)]
     assert len(pairs) >= 2
-    for event in pairs:
-        preferred = max(event.question.pair, key=lambda policy: policy.values[0])
+    for event, question in pairs:
+        preferred = max(question.pair, key=lambda policy: policy.values[0])
         assert event.answer == preferred.id and event.chosen is None
     assert events[-1].state.questions == len(judge.asked) == len(decided)
     assert events[-1].state.policies_shown == sum(len(event.question.shown) for event in decided)

@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -28,7 +29,7 @@ def saved(make_policy, environment, small_config, tmp_path):
 def saved_in(environment, make_policy, small_config, tmp_path):
     policy = make_policy(17)
     (tmp_path / "run" / "policies").mkdir(parents=True)
-    train_state = MOPPO(environment, small_config.ppo).initial_train_state(jax.random.key(3))
+    train_state: Any = MOPPO(environment, small_config.ppo).initial_train_state(jax.random.key(3))
     statistics = train_state.observation_statistics.replace(mean=np.float32([1, -2]), variance=np.float32([4, 0.25]))
     train_state = jax.device_get(train_state.replace(observation_statistics=statistics))
     policy = policy.__class__(**{**vars(policy), "snapshot": train_state})

@@ -176,9 +176,9 @@ def test_enautilus_is_taken_step_by_step_and_told_when_it_has_moved_on(watching)
     watching.said.clear()
     asyncio.run(tab.begin_dialogue(1, 2))
     begun = tab.dialogue
-    assert tab.point_question is begun.question
+    assert begun is not None and tab.point_question is begun.question
     asyncio.run(tab.reply(begun, Choose(0)))
-    assert tab.dialogue.chosen and tab.point_question is None and not watching.said
+    assert vars(tab.dialogue)["chosen"] and tab.point_question is None and not watching.said
     asyncio.run(tab.reply(begun, Choose(0)))
     assert watching.said == [("warning", "The dialogue has moved on in another tab; nothing has changed.")]
     tab.undo_reply()
