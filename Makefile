@@ -16,8 +16,8 @@ demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and
 studio: $(INSTALLED)  ## steer a run on MountainCar yourself, on a web page; the address is printed
 	$(BIN)/jmorl studio --env mo-mountaincarcontinuous-v0
 
-test: $(INSTALLED)  ## the test suite (a few minutes)
-	$(BIN)/python -m pytest
+test: $(INSTALLED)  ## the test suite (a few minutes), the files spread over the cores
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-slow: $(INSTALLED)  ## the tests that take minutes each: physics, interrupted runs, learning
 	$(BIN)/python -m pytest -m slow

@@ -28,7 +28,8 @@ class ActionBox(NamedTuple):
 
         `xp` is `jax.numpy`, or `numpy` for what is computed without JAX.
         """
-        return xp.clip(self.centre + self.half_width * normalized, self.low, self.high)
+        low, high, centre, half_width = (xp.broadcast_to(each, normalized.shape) for each in self)
+        return xp.clip(centre + half_width * normalized, low, high)
 
     @property
     def normalized_bounds(self) -> tuple[np.ndarray, np.ndarray]:  # [A], [A]

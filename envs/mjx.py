@@ -43,7 +43,8 @@ class MjxPhysics:
         def substep(carry: tuple[jax.Array, ...], _: None) -> tuple[tuple[jax.Array, ...], None]:
             qpos, qvel, qacc, displacement = carry
             data = self._data.replace(qpos=qpos, qvel=qvel, qacc_warmstart=qacc, ctrl=control)
-            data = self._step(self._model, data)
+            with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):  # which MJX relies on
+                data = self._step(self._model, data)
             return (data.qpos, data.qvel, data.qacc_warmstart, displacement + self._timestep * data.qvel), None
 
         still = jnp.zeros_like(state.qvel)

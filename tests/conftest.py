@@ -11,6 +11,8 @@ from tests.resuming import train
 
 use_all_cpu_cores()
 jax.config.update("jax_num_cpu_devices", 2)
+jax.config.update("jax_numpy_rank_promotion", "raise")
+jax.config.update("jax_numpy_dtype_promotion", "strict")
 
 # Examples are the same in every run, and a slow machine is no failure.
 hypothesis.settings.register_profile("jmorl", deadline=None, derandomize=True)

@@ -125,7 +125,7 @@ class ThreeWays(Probe):
 
     def transition(self, state, action):
         after = state + 0.3 * jnp.clip(action, -1.0, 1.0)
-        distances = jnp.linalg.norm(jnp.array(self.corners) - after, axis=1)
+        distances = jnp.linalg.norm(jnp.array(self.corners) - after[None], axis=1)
         return Transition(after, -distances, jnp.array(False))
 
 

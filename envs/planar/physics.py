@@ -49,6 +49,12 @@ class PlanarPhysics:
         self, qpos: jax.Array, qvel: jax.Array, control: jax.Array, substeps: int
     ) -> tuple[jax.Array, ...]:  # each [..., V]
         """Any number of leading axes, flattened into one batch and put last; MuJoCo's joint order to level order."""
+        with jax.numpy_rank_promotion("allow"):  # constants of a body are broadcast over the batch everywhere below
+            return self._advanced_in_levels(qpos, qvel, control, substeps)
+
+    def _advanced_in_levels(
+        self, qpos: jax.Array, qvel: jax.Array, control: jax.Array, substeps: int
+    ) -> tuple[jax.Array, ...]:
         model = self.model
         leading = qpos.shape[:-1]
         low, high = (jnp.asarray(bound, control.dtype) for bound in model.control_range)

@@ -46,4 +46,6 @@ def action_bound_loss(
     Beyond the box all samples do the same, so nothing else pulls a mean back that was driven there while the
     noise was large. (The "bounds loss" of rl_games, Makoviichuk and Makoviychuk 2021.)
     """
-    return ((mean - jnp.clip(mean, low, high)) ** 2).sum(-1).mean()
+    lows, highs = (jax.lax.broadcast_to_rank(jnp.asarray(bound, mean.dtype), mean.ndim) for bound in (low, high))
+    nearest = jnp.clip(mean, lows, highs)
+    return ((mean - nearest) ** 2).sum(-1).mean()

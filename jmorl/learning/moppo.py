@@ -228,7 +228,7 @@ class MOPPO:
         final_observation = normalize(train_state.observation_statistics, trajectory.final_observation)
         final_value = self.critic.apply(train_state.parameters["critic"], final_observation)
         advantage = jax.vmap(generalized_advantages, in_axes=(0, 0, 0, 0, 0, None, None))(
-            trajectory.reward / reward_scale,
+            trajectory.reward / jax.lax.broadcast_to_rank(reward_scale, trajectory.reward.ndim),
             value,
             final_value,
             trajectory.terminated,
@@ -271,7 +271,8 @@ class MOPPO:
         """One step of the optimiser down the loss of a minibatch."""
         parameters, optimizer_state = carry
         gradients, diagnostics = jax.grad(self.loss, has_aux=True)(parameters, minibatch)
-        directions, optimizer_state = self.optimizer.update(gradients, optimizer_state, parameters)
+        with jax.numpy_dtype_promotion("standard"):  # which Optax relies on
+            directions, optimizer_state = self.optimizer.update(gradients, optimizer_state, parameters)
         parameters = jax.tree.map(lambda x, direction: x - learning_rate * direction, parameters, directions)
         return (parameters, optimizer_state), diagnostics
 

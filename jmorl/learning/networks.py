@@ -69,7 +69,8 @@ def critic_network(hidden_sizes: Sequence[int], objectives: int) -> MLP:
 
 def gaussian_log_probability(mean: jax.Array, log_std: jax.Array, action: jax.Array) -> jax.Array:
     """Return log N(action; mean, diag exp(2 log_std)): means and actions [..., A] to [...]."""
-    z = (action - mean) * jnp.exp(-log_std)
+    precision, log_std = (jax.lax.broadcast_to_rank(each, mean.ndim) for each in (jnp.exp(-log_std), log_std))
+    z = (action - mean) * precision
     return (-0.5 * z**2 - log_std - 0.5 * math.log(2 * math.pi)).sum(-1)
 
 

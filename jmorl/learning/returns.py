@@ -18,8 +18,9 @@ def generalized_advantages(
     delta_t = r_t + gamma v_tp1 (1 - terminated_t) - v_t;  A_t = delta_t + gamma lambda A_{t+1},
     where either kind of ending cuts the trace and only a termination cuts the bootstrap.
     """
-    delta_t = r_t + discount * v_tp1 * (1.0 - terminated_t)[:, None] - v_t
-    trace_t = discount * lambda_ * (1.0 - (terminated_t | truncated_t))
+    continuing_t = 1.0 - terminated_t.astype(r_t.dtype)
+    delta_t = r_t + discount * v_tp1 * continuing_t[:, None] - v_t
+    trace_t = discount * lambda_ * (1.0 - (terminated_t | truncated_t).astype(r_t.dtype))
 
     def backward(a_tp1: jax.Array, inputs: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         delta, trace = inputs

@@ -130,8 +130,8 @@ def episode_returns(
         kept = (reward, running & step.terminated) if traced else None
         returns = EpisodeReturns(
             returns.undiscounted + reward,
-            returns.discounted + discount**returns.length * reward,
-            returns.length + running,
+            returns.discounted + discount ** returns.length.astype(reward.dtype) * reward,
+            returns.length + running.astype(returns.length.dtype),
         )
         return _Episode(state, step.observation, running & ~(step.terminated | step.truncated), returns), kept
 

@@ -41,7 +41,9 @@ def update_statistics(statistics: RunningStatistics, batch: jax.Array) -> Runnin
 
 def normalize(statistics: RunningStatistics, x: jax.Array) -> jax.Array:
     """`x` [..., *shape] in standard deviations from the mean, clipped to ±10."""
-    normalized = (x - statistics.mean) / jnp.sqrt(statistics.variance + VARIANCE_FLOOR)
+    deviation = jnp.sqrt(statistics.variance + VARIANCE_FLOOR)
+    mean, deviation = (jax.lax.broadcast_to_rank(each, x.ndim) for each in (statistics.mean, deviation))
+    normalized = (x - mean) / deviation
     return jnp.clip(normalized, -NORMALIZED_CLIP, NORMALIZED_CLIP)
 
 

@@ -5,6 +5,7 @@ out the list of what it wrote, and says nothing. Other names it takes for addres
 So it works under plain names only, and what it wrote is read back before anybody relies on it.
 """
 
+import functools
 import gc
 import logging
 import os
@@ -93,6 +94,7 @@ def _orbax() -> Iterator[Any]:
     """
     import orbax.checkpoint as ocp  # takes half a second to import
 
+    _ignore_late_callbacks()
     failure = None
     with _one_at_a_time, _quiet():
         try:
@@ -112,20 +114,29 @@ def _quiet() -> Iterator[None]:
     def heard(record: logging.LogRecord) -> bool:
         return "orbax" not in Path(record.pathname).parts and "never retrieved" not in record.getMessage()
 
-    def but_for_tasks(unraisable: Any) -> None:
-        if str(unraisable.exc_value) != "Event loop is closed":
-            hook(unraisable)
-
-    loggers, hook = (logging.getLogger("absl"), logging.getLogger("asyncio")), sys.unraisablehook
+    loggers = (logging.getLogger("absl"), logging.getLogger("asyncio"))
     for logger in loggers:
         logger.addFilter(heard)
-    sys.unraisablehook = but_for_tasks
     try:
         yield
     finally:
-        sys.unraisablehook = hook
         for logger in loggers:
             logger.removeFilter(heard)
+
+
+@functools.cache
+def _ignore_late_callbacks() -> None:
+    """Say nothing, from now on, of callbacks that Orbax's threads make after it has closed the loop they belong to.
+
+    That may be any time later, on a busy machine, and is not an error.
+    """
+    report = sys.unraisablehook
+
+    def reported(unraisable: Any) -> None:
+        if str(unraisable.exc_value) != "Event loop is closed":
+            report(unraisable)
+
+    sys.unraisablehook = reported
 
 
 def _reason(error: Exception) -> str:

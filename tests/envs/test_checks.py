@@ -23,7 +23,7 @@ class Otherwise(ThreeWays):
         return jnp.zeros(3)
 
     def transition(self, state, action):
-        return Transition({"at": jnp.zeros(1), "steps": state["steps"] + 1.0}, jnp.zeros(2), jnp.zeros(1))
+        return Transition({"at": jnp.zeros(1), "steps": jnp.float32(state["steps"]) + 1.0}, jnp.zeros(2), jnp.zeros(1))
 
 
 class Growing(ThreeWays):
@@ -143,7 +143,7 @@ def test_bounds_may_differ_from_component_to_component():
     [
         ({"observation": lambda x: {"at": x}}, r"observation is a dict, not one array of shape \(2,\): concatenate"),
         ({"observation": lambda x: (x, x)}, r"observation is a tuple of 2, not one array of shape \(2,\)"),
-        ({"observation": lambda x: x + 1j}, "observation is complex64, not real numbers"),
+        ({"observation": lambda x: x.astype(jnp.complex64)}, "observation is complex64, not real numbers"),
         ({"reward": list}, r"reward is a list of 3, not one array of shape \(3,\): stack the objectives"),
         ({"reward": lambda r: {"north": r[0]}}, r"reward is a dict, not one array of shape \(3,\)"),
         ({"reward": lambda r: None}, r"reward is None, not one array of shape \(3,\)"),

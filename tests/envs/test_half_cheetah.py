@@ -77,7 +77,7 @@ def test_one_step_from_visited_states(physics, real, visited):
 def test_thirty_steps_from_the_same_start(physics, real):
     cheetah = HalfCheetah(physics)
     state, _ = cheetah.reset(jax.random.key(1))
-    actions = 0.5 * jnp.sin(0.4 * jnp.arange(30)[:, None] + jnp.arange(6))
+    actions = 0.5 * jnp.sin(0.4 * jnp.arange(30.0)[:, None] + jnp.arange(6.0)[None])
     _, steps = jax.jit(lambda state: jax.lax.scan(cheetah.advance, state, actions))(state)
     real.set_state(*(np.asarray(each, np.float64) for each in (state.physics.qpos, state.physics.qvel)))
     expected = [real.step(np.asarray(action))[:2] for action in actions]

@@ -47,6 +47,16 @@ class Halfway(ThreeWays):
         return result._replace(reward=[*result.reward])
 
 
+class Keeping(ThreeWays):
+    """Keeps what it computed while it was traced."""
+
+    id = "keeping-v0"
+
+    def transition(self, state, action):
+        self.kept = state + action
+        return super().transition(state, action)
+
+
 def check(environment, config):
     check_run(environment, config.learning, envs.make_anew(config.env))
 
@@ -121,3 +131,14 @@ def test_a_run_that_cannot_begin_makes_nothing(registered, tmp_path, capsys, kin
     printed = capsys.readouterr().err
     assert printed.startswith(f"jmorl: {message}") and printed.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("id", envs.ids())
+def test_nothing_of_a_trace_outlives_it(id, small_config):
+    with jax.checking_leaks():
+        check_run(envs.make_anew(id), small_config.learning)
+
+
+def test_what_outlives_a_trace_would_be_found(small_config):
+    with jax.checking_leaks(), pytest.raises(NotAsDeclared, match="Leaked"):
+        check_run(Keeping(), small_config.learning)

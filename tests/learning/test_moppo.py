@@ -32,7 +32,7 @@ def scaled_values(moppo, train_state, observations):
 
 def values(moppo, train_state, observations):
     """The critic's values in raw units."""
-    return scaled_values(moppo, train_state, observations) * return_scale(train_state.return_statistics)
+    return scaled_values(moppo, train_state, observations) * return_scale(train_state.return_statistics)[None]
 
 
 @pytest.mark.parametrize("size", [1, 2, 5, 4000])

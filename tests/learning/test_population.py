@@ -94,7 +94,7 @@ def test_in_float64_an_agent_the_order_and_the_devices_differ_by_rounding_alone(
     order = np.array([2, 0, 3, 1])
     for module in ("execution", "programs"):  # whose settings would be those of float32
         monkeypatch.setattr(f"jmorl.learning.{module}.own_settings", nullcontext)
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), jax.numpy_dtype_promotion("standard"):
         programs, keys = Programs(ThreeWays(), config.learning), jax.random.split(jax.random.key(1), 4)
         start = jax.tree.map(in_float64, programs.initialize(jax.random.split(jax.random.key(0), 4)))
         together, _ = programs.train(start, WEIGHTS, keys, schedule)

@@ -178,7 +178,7 @@ def test_enautilus_is_taken_step_by_step_and_told_when_it_has_moved_on(watching)
     begun = tab.dialogue
     assert begun is not None and tab.point_question is begun.question
     asyncio.run(tab.reply(begun, Choose(0)))
-    assert vars(tab.dialogue)["chosen"] and tab.point_question is None and not watching.said
+    assert getattr(tab.dialogue, "chosen", None) and tab.point_question is None and not watching.said
     asyncio.run(tab.reply(begun, Choose(0)))
     assert watching.said == [("warning", "The dialogue has moved on in another tab; nothing has changed.")]
     tab.undo_reply()
