@@ -6,6 +6,7 @@ module that does so. An id may carry options of its environment: `envs.make("mo-
 
 import importlib
 import inspect
+import re
 import sys
 from collections.abc import Callable, Hashable
 from pathlib import Path
@@ -33,6 +34,7 @@ __all__ = [
     "registry",
 ]
 
+ID = re.compile(r"[^\s,:]+")
 registry: dict[str, Callable[..., Environment[Any]]] = {}  # what `register` fills: factories by id
 _made: dict[
     Hashable, Environment[Any]
@@ -42,8 +44,15 @@ _made: dict[
 def register(id: str, factory: Callable[..., Environment[Any]]) -> None:
     """Make `factory` available as `make(id)`; its parameters are the environment's options.
 
-    Raises ValueError if the id is taken by another factory.
+    Raises ValueError if the id is taken by another factory, or cannot be one, and for a factory that cannot be called.
     """
+    if not isinstance(id, str) or not ID.fullmatch(id):
+        raise ValueError(f"an environment id is a text without spaces, commas and colons, not {id!r}")
+    if not callable(factory):
+        raise ValueError(
+            f"environment {id!r} cannot be made by {type(factory).__name__}: register the class itself, without (), or "
+            "a function that returns an environment"
+        )
     if registry.setdefault(id, factory) is not factory:
         raise ValueError(f"environment id {id!r} is already registered")
 
@@ -72,12 +81,20 @@ def make(id: str, **options: Any) -> Environment[Any]:
 def _new(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> Environment[Any]:
     try:
         environment = factory(**options)
-    except ValueError:
-        raise
+    except ValueError as error:
+        raise ValueError(f"environment {name!r} cannot be made{_with_options(options)}: {error}") from error
     except (Exception, SystemExit) as error:
-        raise ValueError(f"environment {name!r} cannot be made: {failure(error)}") from error
+        raise ValueError(f"environment {name!r} cannot be made{_with_options(options)}: {failure(error)}") from error
+    if not isinstance(environment, Environment):
+        raise ValueError(
+            f"environment {name!r} cannot be made: what is registered returns {environment!r}, not an envs.Environment"
+        )
     check_declaration(environment)
     return environment
+
+
+def _with_options(options: dict[str, Any]) -> str:
+    return f" with {','.join(f'{name}={value}' for name, value in options.items())}" if options else ""
 
 
 def make_anew(id: str) -> Environment[Any]:

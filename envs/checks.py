@@ -41,6 +41,8 @@ def check_environment(environment: Environment[Any], again: Environment[Any] | N
     """
     if _checked.get(id(environment)) is environment:
         return
+    if not isinstance(environment, Environment):
+        raise NotAsDeclared(f"{environment!r} is no environment: it must be an instance of a subclass of Environment")
     check_declaration(environment)
     start = _result(environment, again, "initial_state", jax.eval_shape(lambda: jax.random.key(0)))
     observation = _result(environment, again, "observe", start)
@@ -101,7 +103,7 @@ def _result(environment: Environment[Any], again: Environment[Any] | None, name:
     first = _trace(environment, name, *arguments)
     if not first.same_program(_trace(environment, name, *arguments)):
         raise NotAsDeclared(
-            f"environment {name_of(environment)} is not pure: {name} is another function each time it is called; "
+            f"environment {name_of(environment)} is not pure: {name} computes something else each time it is called; "
             "randomness comes from `key`, and what changes from step to step from `state`"
         )
     if again and not first.same_program(_trace(again, name, *arguments)):
@@ -133,6 +135,7 @@ def _trace(environment: Environment[Any], name: str, *arguments: Any) -> Traced:
 def _wrong_array(name: str, found: Any, size: int, advice: str) -> Iterator[str]:
     """Yield what keeps a result from being a vector of `size` real numbers of any kind."""
     if not isinstance(found, jax.ShapeDtypeStruct):
+        advice = "is a `return` missing?" if found is None else advice
         yield f"{name} is {_kind(found)}, not one array of shape {(size,)}: {advice}"
         return
     if found.shape != (size,):

@@ -23,7 +23,8 @@ ADVICE: dict[type[BaseException], str] = {
 def failure(error: BaseException) -> str:
     """Kind and message of a caught error, and the last line outside the libraries that it came through, if any."""
     frames = traceback.extract_tb(error.__traceback__)[1:]  # the first is the one that caught it
-    own = [frame for frame in frames if not frame.filename.startswith(("<", *LIBRARIES))]
+    foreign = ("<", *LIBRARIES, str(Path(__file__).parent / "tracing.py"))
+    own = [frame for frame in frames if not frame.filename.startswith(foreign)]
     place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
     advice = next((f"; {text}" for kind, text in ADVICE.items() if isinstance(error, kind)), "")
     said = ": ".join(filter(None, (type(error).__name__, _message(error))))

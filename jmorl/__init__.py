@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
     from jmorl.loop import run
-    from jmorl.methods.base import Method, PackedSearch, Problem, Prospect, Tasks
+    from jmorl.methods.base import Method, MethodError, PackedSearch, Problem, Prospect, Tasks
     from jmorl.methods.registry import register_method
     from jmorl.search.policy import Policy
     from jmorl.state import RunState
@@ -61,6 +61,7 @@ __all__ = [
     "Event",
     "GenerationFinished",
     "Method",
+    "MethodError",
     "NavigationFinished",
     "Objective",
     "PackedSearch",
@@ -106,7 +107,7 @@ _HOMES = {
     "jmorl.learning.population": "TrainingFault",
     "jmorl.loop": "run",
     "jmorl.methods.registry": "register_method",
-    "jmorl.methods.base": "Method PackedSearch Problem Prospect Tasks",
+    "jmorl.methods.base": "Method MethodError PackedSearch Problem Prospect Tasks",
     "jmorl.search.policy": "Policy",
     "jmorl.state": "RunState",
     "jmorl.storage.policy_file": "load_policy save_policy",

@@ -196,7 +196,7 @@ def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Sec
     for name, field in section.model_fields.items():
         kind = field.annotation
         if isinstance(kind, type) and issubclass(kind, Section):
-            title = f"{name}: {(kind.__doc__ or '').splitlines()[0].rstrip('.')}"
+            title = f"{name}: {kind.summary()}"
             _add_settings(parser, parser.add_argument_group(title), kind, f"{prefix}{name}.")
         else:
             default = _written(field.default)

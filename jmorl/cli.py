@@ -10,7 +10,7 @@ import os
 import secrets
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,9 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from jmorl.evaluation import NotInGymnasium
     from jmorl.experiments.record import RecordError
     from jmorl.learning.devices import NoDevices, check_devices, use_all_cpu_cores
-    from jmorl.learning.execution import ComputationFailed
+    from jmorl.learning.execution import ComputationFailed, own_settings
     from jmorl.learning.memory import DoesNotFit
     from jmorl.learning.population import TrainingFault
+    from jmorl.methods.base import MethodError
     from jmorl.playback import PlaybackError
     from jmorl.storage.checkpoints import CheckpointError
     from jmorl.storage.lock import FolderInUse
@@ -60,12 +61,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.command in COMPUTING:
             check_devices()
-        COMMANDS[options.command](options)
+        with own_settings() if options.command in COMPUTING else nullcontext():
+            COMMANDS[options.command](options)
     except ConfigError as error:
         return _failed(error.problems, EXIT_BAD_INPUT)
     except (*wrong_place, DoesNotFit, NoDevices, NoDrawing, NotAsDeclared, NotInGymnasium, PlaybackError) as error:
         return _failed([str(error)], EXIT_BAD_INPUT)
-    except (TrainingFault, ComputationFailed, ScriptError, EOFError, OSError, CheckpointError) as error:
+    except (TrainingFault, ComputationFailed, MethodError, ScriptError, EOFError, OSError, CheckpointError) as error:
         return _failed([f"stopped: {error}", *_notes(error)], EXIT_FAILED)
     except MemoryError as error:
         return _failed([f"stopped: there is no memory left: {error}", *_notes(error)], EXIT_FAILED)
@@ -178,9 +180,9 @@ def _tell_of_reference(run: "StoredRun") -> None:
     """Say which part of the front the hypervolume does not see, if there is one."""
     if run.below_reference:
         print(
-            f"{run.below_reference} of the {len(run.front)} policies of the front lie below the reference point "
-            f"{tuple(run.config.reference_point) or 'that the warm-up set'}, so the hypervolume does not count them; "
-            "--reference-point sets a lower one."
+            f"Policies of the front below the reference point: {run.below_reference} of {len(run.front)}. The "
+            f"hypervolume does not count them. The reference point is "
+            f"{tuple(run.config.reference_point) or 'what the warm-up set'}; set a lower one with --reference-point."
         )
 
 

@@ -28,6 +28,21 @@ from jmorl.settings import Count, Finite, NonNegative, Section
 
 C = TypeVar("C", bound="Section")
 
+# What pydantic's errors say of a value, by their types.
+MUST = {
+    **dict.fromkeys(("int_parsing", "int_parsing_size", "int_type", "int_from_float"), "a whole number"),
+    **dict.fromkeys(("float_parsing", "float_type"), "a number"),
+    "finite_number": "a finite number",
+    "greater_than": "above {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "below {lt}",
+    "less_than_equal": "at most {le}",
+    "string_type": "a text",
+    "tuple_type": "numbers separated by commas",
+    "too_short": "{min_length} number or more",
+    **dict.fromkeys(("model_type", "model_attributes_type"), "a section, with settings of its own"),
+}
+
 
 class ConfigError(ValueError):
     """A config that cannot be run. `problems` has one line for each thing that is wrong."""
@@ -182,8 +197,9 @@ class Config(Section):
 
 
 def resolve(preset: str = "default", file: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
-    """Return preset, then config file (TOML), then overrides (nested; strings are parsed), validated.
+    """Return preset, then config file (TOML), then overrides, validated.
 
+    Overrides are nested, or named `section.field`; strings are parsed.
     An environment without an entry in the preset takes the general defaults. A file that a run wrote has every setting;
     one that was added since means what was done before there was such a setting, whatever the preset. Raises
     ConfigError with every problem of all three.
@@ -195,7 +211,9 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
     from_file: dict[str, Any] = {}
     if file is not None:
         try:
-            from_file = _with_underscores(tomllib.loads(file.read_text(encoding="utf-8-sig")))
+            from_file = _by_section(tomllib.loads(file.read_text(encoding="utf-8-sig")))
+        except UnicodeDecodeError:
+            problems.append(f"config: cannot read {file}: it is not a text in UTF-8, as TOML has to be")
         except (OSError, ValueError) as error:
             problems.append(f"config: cannot read {file}: {error}")
     written = config_format.format_of(from_file)
@@ -204,7 +222,12 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
         problems.append(
             f"config: {file} has format {written}; this jmorl knows up to {config_format.FORMAT}: update it"
         )
-    chosen = _merged(from_file, overrides or {})
+    given: dict[str, Any] = {}
+    try:
+        given = _by_section(overrides or {})
+    except ValueError as error:
+        problems.append(str(error))
+    chosen = _merged(from_file, given)
     env = chosen.get("env", Config.model_fields["env"].default)
     base = PRESETS.get(preset, {}).get(envs.plain_id(env), {}) if isinstance(env, str) else {}
     if written is not None:
@@ -212,17 +235,20 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
     return _validated(Config, _merged(base, chosen), problems)
 
 
-def _with_underscores(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings whose names may be written as flags are: `warmup-iterations`.
+def _by_section(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings, nested, whose names may be written as flags are: `population.warmup-iterations`.
 
     Raise ValueError for one given twice.
     """
     plain: dict[str, Any] = {}
     for written, value in settings.items():
-        name = written.replace("-", "_")
-        if name in plain:
-            raise ValueError(f"{name} is given twice")
-        plain[name] = _with_underscores(value) if isinstance(value, Mapping) else value
+        section, dot, rest = written.replace("-", "_").partition(".")
+        inner = _by_section({rest: value}) if dot else _by_section(value) if isinstance(value, Mapping) else value
+        both_are_sections = isinstance(inner, Mapping) and isinstance(plain.get(section), Mapping)
+        twice = inner.keys() & plain[section].keys() if both_are_sections else {section} & plain.keys()
+        if twice:
+            raise ValueError(f"{min(twice)} is given twice")
+        plain[section] = {**plain[section], **inner} if both_are_sections else inner
     return plain
 
 
@@ -240,7 +266,10 @@ def _validated(kind: type[C], values: Mapping[str, Any], problems: list[str] | N
     try:
         config = kind.model_validate(values)
     except pydantic.ValidationError as error:
-        problems += [_sentence(each) for each in error.errors()]
+        found = error.errors()
+        within = {each["loc"][:-1] for each in found}
+        # Of a list whose parts are wrong, its length is no news.
+        problems += [_sentence(each) for each in found if each["type"] != "too_short" or each["loc"] not in within]
     if problems:
         raise ConfigError(problems)
     return config
@@ -258,6 +287,8 @@ def _sentence(error: Any) -> str:
             known = re.findall("'([^']*)'", error["ctx"]["expected"])
             near = did_you_mean(nearest(str(error["input"]), known))
             return f"{where}: must be {error['ctx']['expected']}, not {error['input']!r}{near}"
+    if error["type"] in MUST:
+        return f"{where}: must be {MUST[error['type']].format(**error.get('ctx', {}))}, not {error['input']!r}"
     return f"{where}: {error['msg'][0].lower()}{error['msg'][1:]}, not {error['input']!r}"
 
 

@@ -19,10 +19,11 @@ from jmorl.config import Config
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
 from jmorl.decision.users import make_user
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
+from jmorl.learning.execution import own_settings
 from jmorl.learning.moppo import TrainState
 from jmorl.learning.population import Population
 from jmorl.methods import registry
-from jmorl.methods.base import Method, Problem, Tasks
+from jmorl.methods.base import Method, Problem, Tasks, checked_tasks
 from jmorl.scoring import Scores, paper_scores, raw_scores
 from jmorl.search.metrics import front_metrics
 from jmorl.search.policy import Policy, values_of
@@ -45,14 +46,25 @@ def run(
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
     An `environment` that is not the config's is refused with NotAsDeclared.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
-    generation in which a number stops being finite, and AnswerError for an answer that its question does not allow;
-    the events before it stand.
+    generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
+    MethodError for tasks that cannot be trained; the events before it stand.
     """
+    _check_kind("config", config, Config, "as `jmorl.resolve` returns it")
     environment = environment or envs.make(config.env)
+    _check_kind("environment", environment, Environment, "as `envs.make` returns it")
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
+    _check_kind("decision_maker", decision_maker, DecisionMaker, "an instance of a subclass")
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
     return _Run(config, environment, decision_maker, population).events(state)
+
+
+def _check_kind(name: str, value: object, kind: type, how: str) -> None:
+    """Raise TypeError for a value of another kind."""
+    if not isinstance(value, kind):
+        given = f"the class {value.__name__}" if isinstance(value, type) else repr(value)
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise TypeError(f"{name} must be {article} {kind.__name__}, {how}, not {given}")
 
 
 def make_method(config: Config, environment: Environment[Any]) -> Method[Any]:
@@ -61,6 +73,7 @@ def make_method(config: Config, environment: Environment[Any]) -> Method[Any]:
     return registry.make(config.method, Problem(objectives, config.first_weights(), config.seed, config.search))
 
 
+@own_settings()
 def evaluation_keys(config: Config, evaluated: int = 0) -> jax.Array:
     """Return the keys [episodes] from which a run evaluates its policies, all agents from the same.
 
@@ -73,9 +86,15 @@ def evaluation_keys(config: Config, evaluated: int = 0) -> jax.Array:
     return jax.random.split(key, config.evaluation.episodes)
 
 
+@own_settings()
 def _keys(config: Config) -> jax.Array:
     """Return those for initialisation, training and evaluation, [3]."""
     return jax.random.split(jax.random.key(config.seed), 3)
+
+
+@own_settings()
+def _training_key(config: Config, generation: int) -> jax.Array:
+    return jax.random.fold_in(_keys(config)[1], generation)
 
 
 class _Run:
@@ -90,7 +109,6 @@ class _Run:
         self.population = population
         self.method = make_method(config, environment)
         self.metric_weights = candidate_grid(len(environment.objectives), config.search.weight_divisions)
-        self.initial_key, self.training_key, _ = _keys(config)
 
     def events(self, state: RunState | None) -> Iterator[Event]:
         yield Compiled(self.population.compile(), self.population.devices)
@@ -126,7 +144,7 @@ class _Run:
         units = initial_units(objectives) if in_paper_units else None
         state = RunState(self.method.initial_state(), units=units)
         weights = self.method.problem.weights
-        train_states = self.population.initialize(self.initial_key)
+        train_states = self.population.initialize(_keys(self.config)[0])
         # The authors score untrained agents, too: they enter archive and buffer, and set the units.
         untrained: tuple[Policy, ...] = ()
         if in_paper_units:
@@ -138,7 +156,7 @@ class _Run:
         """Train what the method asks for, and take the offspring in."""
         state = replace(state, generation=state.generation + 1)
         started = time.perf_counter()
-        tasks = self.method.tasks(state)
+        tasks = checked_tasks(self.method.tasks(state), self.method.problem)
         select_seconds = time.perf_counter() - started
         train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in tasks.parents))
         iterations = self.config.population.iterations
@@ -187,7 +205,7 @@ class _Run:
     ) -> GenerationFinished:
         """Train agents [P] with weights [P, M], evaluate them, and take them in."""
         started = time.perf_counter()
-        key = jax.random.fold_in(self.training_key, state.generation)
+        key = _training_key(self.config, state.generation)
         train_states, diagnostics = self.population.train(
             train_states, weights, key, iterations, self.config.learning_rate(state.iterations)
         )

@@ -3,12 +3,14 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, get_args, get_origin
 
+import numpy as np
 import pydantic
 from pydantic import Field, model_validator
 
 Count = Annotated[int, Field(ge=1, le=2**31 - 1)]  # compiled programs count in 32 bits
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+LARGEST = float(np.finfo(np.float32).max)  # which they compute in
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -16,6 +18,11 @@ class Section(pydantic.BaseModel):
     """A group of settings: immutable, hashable, unknown names refused."""
 
     model_config = pydantic.ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+    @classmethod
+    def summary(cls) -> str:
+        """Return what the settings are about, in a line; nothing where Python was told to drop such texts."""
+        return (cls.__doc__ or "").partition("\n")[0].rstrip(".")
 
     @model_validator(mode="before")
     @classmethod

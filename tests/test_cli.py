@@ -419,6 +419,7 @@ def test_a_terminal_that_cannot_move_its_cursor_gets_lines(options, term, kind):
         {"MPLBACKEND": "module://matplotlib_inline.backend_inline"},
         {"PYTHONIOENCODING": "ascii"},
         {"LC_ALL": "C", "PYTHONUTF8": "0", "XDG_CACHE_HOME": "", "HOME": "/proc/nowhere"},
+        {"PYTHONOPTIMIZE": "2"},
     ],
     ids=lambda variables: next(iter(variables)),
 )
@@ -437,3 +438,25 @@ def test_a_run_is_shown_on_any_machine(trained, tmp_path, variables):
     assert (folder / "plots" / "front.png").exists()
     table = shown.stdout.split(b"Final front")[1].split(b"plot: ")[0].decode()
     assert all(f" {row['policy']} " in table for row in rows(folder / "front.csv"))
+
+
+@pytest.mark.parametrize(
+    "variables", [{"LC_ALL": "C", "PYTHONUTF8": "0"}, {"LC_ALL": "C.UTF-8", "JAX_TRANSFER_GUARD": "disallow"}]
+)
+def test_a_run_is_made_and_read_on_any_machine(tmp_path, variables):
+    """Into a folder whose name is no text in the locale, or in none."""
+    program = [sys.executable, "-m", "jmorl", *TRAIN, "--env", "tests.registered:probe-three-ways", "--steps", "960"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
+    name = os.fsdecode(b"gr\xf6\xc3\xa9")
+    made = subprocess.run([*program, "--out", name], env=environment, capture_output=True, cwd=tmp_path)
+    assert made.returncode == 0 and not made.stderr, made.stderr
+    assert read_run(tmp_path / name).result is not None
+    again = subprocess.run([*program[:3], "resume", name], env=environment, capture_output=True, cwd=tmp_path)
+    assert again.returncode == 0 and again.stderr.endswith(b"there is nothing to resume\n")
+
+
+def test_a_name_that_is_too_long_makes_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([*TRAIN, "--out", "x" * 300]) == 2
+    assert capsys.readouterr().err == f"jmorl: out: {'x' * 300} cannot be used: File name too long\n"
+    assert not list(tmp_path.iterdir())

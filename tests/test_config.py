@@ -196,13 +196,36 @@ def test_a_config_cannot_be_changed_in_place():
         ({"env": "mo-mountaincar-v0"}, "; did you mean 'mo-mountaincarcontinuous-v0'?"),
         ({"user": "weight=1,2"}, "terminal, script=FILE; did you mean 'weights'?"),
         ({"user": "b"}, "script=FILE; did you mean 'B'?"),
-        ({"ppo": {"epochs": "9" * 20}}, "ppo.epochs: input should be less than or equal to 2147483647"),
+        ({"ppo": {"epochs": "9" * 20}}, "ppo.epochs: must be at most 2147483647, not"),
+        ({"ppo": {"clip": 1e300}}, "ppo.clip: must be at most 3.4028234663852886e+38, not 1e+300"),
+        ({"ppo": {"epochs": "x"}}, "ppo.epochs: must be a whole number, not 'x'"),
+        ({"ppo": {"epochs": 1.5}}, "ppo.epochs: must be a whole number, not 1.5"),
+        ({"ppo": {"clip": "nan"}}, "ppo.clip: must be a finite number, not 'nan'"),
+        ({"ppo": {"hidden_sizes": "0"}}, "ppo.hidden_sizes.0: must be at least 1, not '0'"),
+        ({"ppo": {"hidden_sizes": ""}}, "ppo.hidden_sizes: must be 1 number or more, not []"),
+        ({"ppo": 3}, "ppo: must be a section, with settings of its own, not 3"),
     ],
 )
 def test_what_is_unknown_or_too_large_says_what_would_do(overrides, problem):
     with pytest.raises(ConfigError, match=re.escape(problem)) as error:
         resolve(overrides=overrides)
     assert len(error.value.problems) == 1
+
+
+def test_settings_may_be_named_by_section(tmp_path):
+    file = tmp_path / "config.toml"
+    file.write_text('"ppo.rollout-steps" = 64\n[ppo]\nepochs = 3\n', encoding="utf-8")
+    config = resolve(file=file, overrides={"population.agents": 2, "ppo": {"clip": 0.3}})
+    assert (config.population.agents, config.ppo.epochs, config.ppo.rollout_steps, config.ppo.clip) == (2, 3, 64, 0.3)
+    with pytest.raises(ConfigError, match="epochs is given twice"):
+        resolve(overrides={"ppo.epochs": 2, "ppo": {"epochs": 3}})
+
+
+def test_a_file_in_another_encoding_is_named(tmp_path):
+    file = tmp_path / "config.toml"
+    file.write_bytes("# größer".encode("latin-1"))
+    with pytest.raises(ConfigError, match="config.toml: it is not a text in UTF-8, as TOML has to be"):
+        resolve(file=file)
 
 
 def test_an_unknown_preset_names_the_nearest():

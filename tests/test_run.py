@@ -11,6 +11,7 @@ import pytest
 
 from jmorl.config import resolve
 from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.decision.utility import UtilityUser
 from jmorl.events import Compiled, Decided, GenerationFinished, RunFinished
 from jmorl.learning.population import Population, TrainingFault
 from jmorl.loop import run
@@ -220,6 +221,19 @@ def test_an_environment_that_is_not_as_it_declares_is_refused(small_config):
         ValueError, match=r"probe-three-ways is not as it declares: reward has shape \(2,\), not \(3,\)"
     ):
         next(run(small_config, Recorder(), Short()))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"decision_maker": UtilityUser}, "decision_maker must be a DecisionMaker, .* not the class UtilityUser"),
+        ({"decision_maker": "A"}, "decision_maker must be a DecisionMaker, an instance of a subclass, not 'A'"),
+        ({"environment": "cart:cart-v0"}, "environment must be an Environment, as `envs.make` returns it, not 'cart"),
+    ],
+)
+def test_what_is_of_another_kind_is_named(small_config, arguments, message):
+    with pytest.raises(TypeError, match=message):
+        run(small_config, **arguments)
 
 
 def test_another_environment_than_the_configs_is_refused(small_config):

@@ -37,7 +37,7 @@ def to_path(text: str) -> Path:
     try:
         os.fsencode(text)
     except UnicodeEncodeError:
-        return Path(os.fsdecode(text.encode()))
+        return Path(os.fsdecode(text.encode(errors="surrogateescape")))
     return Path(text)
 
 

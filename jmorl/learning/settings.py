@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from jmorl.settings import Count, Finite, NonNegative, Positive, Section
+from jmorl.settings import LARGEST, Count, NonNegative, Positive, Section
 
 
 class PPOConfig(Section):
@@ -29,7 +29,9 @@ class PPOConfig(Section):
         0.0, description="weight of the penalty on mean actions outside the environment's box"
     )
     max_gradient_norm: Positive = Field(0.5, description="one global norm over all parameters")
-    initial_log_std: Finite = Field(0.0, description="log standard deviation of a new agent's actions")
+    initial_log_std: Annotated[float, Field(ge=-LARGEST, le=LARGEST)] = Field(
+        0.0, description="log standard deviation of a new agent's actions"
+    )
     noise_correlation: Annotated[float, Field(ge=0, lt=1)] = Field(
         0.0, description="of the exploration noise of successive actions"
     )

@@ -9,7 +9,7 @@ Letters: P agents, M objectives, N policies, K predictions.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -65,6 +65,37 @@ class PackedSearch:
     document: Mapping[str, Any] = field(default_factory=dict)  # what JSON can hold; policies by their ids
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)  # none of them empty
     policies: Sequence[Policy] = ()  # all that the document mentions
+
+
+class MethodError(ValueError):
+    """A search method does not keep to the protocol. The message says what it gave, and what it should give."""
+
+
+def checked_tasks(tasks: Any, problem: Problem) -> Tasks:
+    """Return the tasks of a generation with arrays as arrays. Raise MethodError for what cannot be trained."""
+    agents, objectives = problem.weights.shape
+    if not isinstance(tasks, Tasks):
+        raise MethodError(f"tasks must return jmorl.Tasks, not {tasks!r}")
+    parents = list(tasks.parents)
+    if len(parents) != agents or not all(isinstance(parent, Policy) for parent in parents):
+        raise MethodError(f"tasks must have a policy for each of {agents} agents as its parents, not {parents!r}")
+    weights = _numbers("weights", tasks.weights, (agents, objectives))
+    if (weights < 0).any() or not weights.any(axis=1).all():
+        raise MethodError("the weights of a task must not be negative, and not all zero")
+    predicted = None if tasks.predicted is None else _numbers("predicted", tasks.predicted, (agents, objectives))
+    return replace(tasks, parents=parents, weights=weights, predicted=predicted)
+
+
+def _numbers(name: str, given: Any, shape: tuple[int, int]) -> np.ndarray:
+    """Return an array [P, M] of finite numbers. Raise MethodError if it is none."""
+    try:
+        array = np.asarray(given)
+        valid = array.shape == shape and bool(np.isfinite(array).all())
+    except (TypeError, ValueError):
+        valid = False
+    if not valid:
+        raise MethodError(f"the {name} of tasks must be finite numbers of shape {shape}, agents by objectives")
+    return array
 
 
 class Method(ABC, Generic[SearchState]):

@@ -18,7 +18,13 @@ _registry: dict[str, "type[Method] | str"] = {
 
 
 def register_method(name: str, method: "type[Method]") -> None:
-    """Make a method available by a name. Raise ValueError if another method has it."""
+    """Make a method available by a name. Raise ValueError if another method has it, or if it is no whole method."""
+    from jmorl.methods.base import Method
+
+    if not (isinstance(method, type) and issubclass(method, Method)):
+        raise ValueError(f"method {name!r} must be a subclass of jmorl.Method, not {method!r}")
+    if method.__abstractmethods__:
+        raise ValueError(f"method {name!r} lacks {', '.join(sorted(method.__abstractmethods__))}")
     if _registry.setdefault(name, method) is not method:
         raise ValueError(f"method {name!r} is already registered")
 

@@ -53,8 +53,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write or replace a JSON file. Raises ValueError for NaN and infinity, which JSON does not have."""
-    write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    """Write or replace a JSON file. Raises ValueError for NaN and infinity, which JSON does not have.
+
+    A byte of a file name that is no text becomes a question mark: what reads JSON refuses it.
+    """
+    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(path, text.encode(errors="replace").decode() + "\n")
 
 
 def append_text(path: Path, text: str) -> None:

@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from typing_extensions import TypedDict
 
 from jmorl.config import Config
+from jmorl.display.characters import unicode_argument
 from jmorl.storage.documents import DocumentError, check_fields, json_object
 from jmorl.storage.layout import Layout
 from jmorl.storage.versions import check_format
@@ -60,7 +61,7 @@ def new_manifest(config: Config, parent: Manifest | None = None) -> Manifest:
         "run": uuid.uuid4().hex,
         "parent": parent,
         "started": now(),
-        "command": [Path(program).name, *arguments],
+        "command": [Path(program).name, *map(unicode_argument, arguments)],
         "config": config.identity(),
         "seed": config.seed,
         "commit": _commit(),

@@ -65,13 +65,14 @@ class Continued:
             yield event
 
 
-def resume(path: Path, user: DecisionMaker | None = None) -> Continued:
+def resume(path: Path | str, user: DecisionMaker | None = None) -> Continued:
     """Take up a run from its last good checkpoint, or from the beginning if it has none yet.
 
     Logs that are ahead of the checkpoint are cut back to it, but answers are kept, and what a killed process left
     half-written is deleted. `user` takes the place of the config's, who then need not be there any more. Raises
     CannotContinue, FolderInUse, NewerFormat and NotAsDeclared, having changed nothing.
     """
+    path = Path(path)
     manifest, config = read_start(path)
     ended = AlreadyFinished(f"the run in {path} has ended; there is nothing to resume")
     if Layout(path).result.exists():
@@ -97,13 +98,16 @@ def resume(path: Path, user: DecisionMaker | None = None) -> Continued:
         return Continued(folder, state, tuple(notes), user)
 
 
-def branch(path: Path, generation: int, out: Path, user: str | None = None, force: bool = False) -> Continued:
+def branch(
+    path: Path | str, generation: int, out: Path | str, user: str | None = None, force: bool = False
+) -> Continued:
     """Make a new run, in the folder `out`, that begins where a run was after a generation.
 
     It has the earlier run's logs up to there and decides for itself from then on, at once; `user` says who, if not as
     before. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or has a script
     that cannot be read, ConfigError; nothing is made then.
     """
+    path, out = Path(path), Path(out)
     manifest, config = read_start(path)
     config = config.replace(user=user) if user else config
     environment = _environment(config)

@@ -72,7 +72,7 @@ class RunFolder:
     @classmethod
     def create(
         cls,
-        path: Path | None,
+        path: Path | str | None,
         config: Config,
         environment: Environment[Any],
         force: bool = False,
@@ -84,6 +84,7 @@ class RunFolder:
         `parent` is as in `new_manifest`. Raises FolderInUse as `check_free` does, or if the folder cannot be made, and
         NotAsDeclared for an environment that is not what it says, or not what `config` names; nothing is changed then.
         """
+        path = Path(path) if path else None
         if path:
             check_free(path, force)
         check_run(environment, config.learning, envs.make_anew(config.env))
@@ -228,12 +229,15 @@ def check_free(path: Path, force: bool) -> None:
     A folder that is not empty is in use. `force` allows to overwrite a run that no process is writing, and nothing
     else.
     """
-    if path.exists() and not path.is_dir():
-        raise FolderInUse(f"{path} is a file; a run needs a folder of its own")
-    layout = Layout(path)
-    if _has_run(layout):
-        check_unlocked(path)
-    _check_contents(layout, force)
+    try:
+        if path.exists() and not path.is_dir():
+            raise FolderInUse(f"{path} is a file; a run needs a folder of its own")
+        layout = Layout(path)
+        if _has_run(layout):
+            check_unlocked(path)
+        _check_contents(layout, force)
+    except OSError as error:
+        raise FolderInUse(f"{path} cannot be used: {error.strerror}") from error
 
 
 def _check_contents(layout: Layout, force: bool) -> None:

@@ -18,7 +18,7 @@ from jmorl.config import Config
 from jmorl.learning.execution import own_settings
 from jmorl.learning.moppo import MOPPO
 from jmorl.loop import make_method
-from jmorl.methods.base import Method
+from jmorl.methods.base import Method, MethodError, PackedSearch
 from jmorl.search.archive import Archive
 from jmorl.search.policy import Policy
 from jmorl.state import RunState
@@ -45,6 +45,8 @@ def pack(state: RunState, method: Method[Any]) -> PackedState:
     """Return the whole state, after the warm-up or later. Every policy that it mentions is kept once."""
     assert state.reference_point is not None, "the warm-up sets it"
     search = method.pack(state.search)
+    if not isinstance(search, PackedSearch):
+        raise MethodError(f"pack must return a jmorl.PackedSearch, not {search!r}")
     choice = (state.choice,) if state.choice else ()
     known = {policy.id: policy for policy in (*state.archive.members, *search.policies, *choice)}
     policies = [known[each] for each in sorted(known)]

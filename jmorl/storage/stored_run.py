@@ -75,8 +75,9 @@ class StoredRun:
         return np.nan_to_num(np.stack(columns, axis=1), nan=-np.inf)
 
 
-def read_run(path: Path) -> StoredRun:
+def read_run(path: Path | str) -> StoredRun:
     """Read a run folder. Raises NewerFormat, and StoredRunError, naming the file, for none or a damaged one."""
+    path = Path(path)
     layout = Layout(path)
     if not layout.manifest.exists() or not layout.metrics.exists():
         raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up")

@@ -59,8 +59,9 @@ def one_step(model: mujoco.MjModel, states: States, dtype: type) -> BodyState:
 
 def forwarded(model: PlanarModel, qpos: jax.Array, qvel: jax.Array, control: jax.Array) -> Forward:
     """A batch of states, the batch first and in MuJoCo's order, up to the constrained acceleration."""
-    drive = jnp.asarray(model.actuator_gear) @ jnp.clip(control, *model.control_range).T
-    return forward(model, qpos.T[model.dofs], qvel.T[model.dofs], drive)
+    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):  # as within `PlanarPhysics`
+        drive = jnp.asarray(model.actuator_gear) @ jnp.clip(control, *model.control_range).T
+        return forward(model, qpos.T[model.dofs], qvel.T[model.dofs], drive)
 
 
 def _stages(

@@ -136,3 +136,31 @@ def test_what_is_meant_is_named():
         envs.make("mo-halfchetah-v5")
     with pytest.raises(ValueError, match="known: physics; did you mean 'physics'?"):
         envs.make("mo-halfcheetah-v5,physic=mjx")
+
+
+@pytest.mark.parametrize(
+    ("id", "factory", "message"),
+    [
+        ("car", MountainCar(), r"'car' cannot be made by MountainCar: register the class itself, without \(\)"),
+        ("car", 5, "'car' cannot be made by int"),
+        (None, MountainCar, "a text without spaces, commas and colons, not None"),
+        ("a,b", MountainCar, "a text without spaces, commas and colons, not 'a,b'"),
+        ("a:b", MountainCar, "a text without spaces, commas and colons, not 'a:b'"),
+    ],
+)
+def test_what_could_never_be_made_is_not_registered(id, factory, message):
+    before = dict(envs.registry)
+    with pytest.raises(ValueError, match=message):
+        envs.register(id, factory)
+    assert envs.registry == before
+
+
+def test_a_factory_that_returns_no_environment_is_named(monkeypatch):
+    monkeypatch.setitem(envs.registry, "nothing", lambda: None)
+    with pytest.raises(ValueError, match=r"'nothing' cannot be made: what is registered returns None, not an"):
+        envs.make("nothing")
+
+
+def test_a_class_is_no_environment():
+    with pytest.raises(envs.NotAsDeclared, match="MountainCar'> is no environment: it must be an instance"):
+        envs.check_environment(MountainCar)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jmorl import Decided, DecisionMaker, GenerationFinished, PairQuestion, WeightQuestion, run
+from jmorl import Decided, DecisionMaker, GenerationFinished, Method, MethodError, PairQuestion, WeightQuestion, run
 from jmorl.config import ConfigError
 from jmorl.decision.protocol import Answer, AnswerError
 from jmorl.decision.scripted import ScriptedUser
@@ -95,6 +95,45 @@ def test_a_user_who_cannot_weigh_says_so(config):
 
     with pytest.raises(AnswerError, match="Plain cannot say how much each objective matters"):
         list(run(config, Plain()))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda tasks: None, "tasks must return jmorl.Tasks, not None"),
+        (lambda tasks: replace(tasks, parents=tasks.parents[1:]), "a policy for each of 4 agents"),
+        (lambda tasks: replace(tasks, parents=[0, 1, 2, 3]), "a policy for each of 4 agents"),
+        (lambda tasks: replace(tasks, weights=tasks.weights[:, :2]), r"weights of tasks must be .* \(4, 3\)"),
+        (lambda tasks: replace(tasks, weights=np.full((4, 3), np.nan)), "weights of tasks must be finite"),
+        (lambda tasks: replace(tasks, weights=np.zeros((4, 3))), "must not be negative, and not all zero"),
+        (lambda tasks: replace(tasks, weights="even"), "weights of tasks must be finite"),
+        (lambda tasks: replace(tasks, predicted=[1.0]), "predicted of tasks must be finite"),
+    ],
+)
+def test_tasks_that_cannot_be_trained_are_named(monkeypatch, small_config, change, message):
+    tasks = PGMORL.tasks
+    monkeypatch.setattr(PGMORL, "tasks", lambda method, run: change(tasks(method, run)))
+    with pytest.raises(MethodError, match=message):
+        list(run(small_config))
+
+
+def test_weights_may_be_a_list(monkeypatch, small_config):
+    tasks = PGMORL.tasks
+    monkeypatch.setattr(
+        PGMORL, "tasks", lambda method, run: replace(tasks(method, run), weights=tasks(method, run).weights.tolist())
+    )
+    assert list(run(small_config.replace(steps=4 * 3 * 16 * 3)))
+
+
+def test_a_method_that_is_not_whole_is_not_registered():
+    class Half(Method):
+        def tasks(self, run):
+            return None
+
+    with pytest.raises(ValueError, match="method 'half' lacks initial_state, pack, taken_in, unpack"):
+        registry.register_method("half", Half)
+    with pytest.raises(ValueError, match="'half' must be a subclass of jmorl.Method, not 3"):
+        registry.register_method("half", 3)
 
 
 def test_an_unknown_method_is_refused_and_the_nearest_is_named(small_config):
