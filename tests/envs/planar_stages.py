@@ -36,7 +36,7 @@ def relative_difference(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:  # 
 def planar_stages(model: mujoco.MjModel, states: States) -> Stages:
     """Our stages, in float64."""
     planar = compile_model(model)
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), jax.numpy_rank_promotion("allow"):  # the latter as within `PlanarPhysics`
         found = jax.jit(lambda *each: _stages(model, planar, *each), compiler_options=QUICK_TO_COMPILE)(*states)
     after = one_step(model, states, np.float64)
     return Stages(*(np.asarray(each) for each in (*found, after.qpos, after.qvel)))
@@ -59,7 +59,7 @@ def one_step(model: mujoco.MjModel, states: States, dtype: type) -> BodyState:
 
 def forwarded(model: PlanarModel, qpos: jax.Array, qvel: jax.Array, control: jax.Array) -> Forward:
     """A batch of states, the batch first and in MuJoCo's order, up to the constrained acceleration."""
-    with jax.numpy_rank_promotion("allow"), jax.numpy_dtype_promotion("standard"):  # as within `PlanarPhysics`
+    with jax.numpy_rank_promotion("allow"):  # as within `PlanarPhysics`
         drive = jnp.asarray(model.actuator_gear) @ jnp.clip(control, *model.control_range).T
         return forward(model, qpos.T[model.dofs], qvel.T[model.dofs], drive)
 
