@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 import pydantic
@@ -81,6 +81,9 @@ class Config(Section):
     user: str = Field(
         "A",
         description="who decides: A, B, C, weights=0.6,0.4[,chebyshev], target=-80,-42, terminal, script=FILE",
+    )
+    ask: Literal["always", "unsure"] = Field(
+        "always", description="whom: the user always, or only where their answers so far leave open what they prefer"
     )
     seed: Annotated[int, Field(ge=0, lt=2**32)] = Field(1, description="of all randomness")
     population: PopulationConfig = PopulationConfig()

@@ -17,6 +17,7 @@ BASELINE: Mapping[str, Any] = {
     "env": "mo-mountaincarcontinuous-v0",
     "method": "interactive",
     "user": "A",
+    "ask": "always",
     "seed": 1,
     "population.agents": 6,
     "population.warmup_iterations": 10,
@@ -46,6 +47,9 @@ BASELINE: Mapping[str, Any] = {
     "evaluation.scale_discount": 0.995,
     "search.delta": 0.1,
     "search.bounds_scale": "range",
+    "search.least_slack": 0.0,
+    "search.least_within": 0,
+    "search.outside_share": 0.0,
     "search.gain_within": "bounds",
     "search.value_scale": "range",
     "search.sparsity_weight": 1.0,
@@ -56,7 +60,9 @@ BASELINE: Mapping[str, Any] = {
     "steps": 2_500_000,
     "reference_point": [],
 }
-ADDED_SINCE_FORMAT_1 = frozenset({"population.weights"})
+ADDED_SINCE_FORMAT_1 = frozenset(
+    {"ask", "population.weights", "search.least_slack", "search.least_within", "search.outside_share"}
+)
 WITHOUT_EFFECT = frozenset({"checkpoints.keep"})  # on results
 
 

@@ -17,6 +17,8 @@ from envs.checks import check_same
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
+from jmorl.decision.remembered import RunRecord
+from jmorl.decision.stand_in import StandIn
 from jmorl.decision.users import make_user
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
 from jmorl.learning.execution import own_settings
@@ -39,12 +41,14 @@ def run(
     environment: Environment[Any] | None = None,
     state: RunState | None = None,
     population: Population | None = None,
+    history: Sequence[RunRecord] = (),
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
     An `environment` that is not the config's is refused with NotAsDeclared.
+    The `history` of its decisions is what a stand-in needs to know then (`ask` in the config).
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
     MethodError for tasks that cannot be trained; the events before it stand.
@@ -54,6 +58,8 @@ def run(
     _check_kind("environment", environment, Environment, "as `envs.make` returns it")
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
     _check_kind("decision_maker", decision_maker, DecisionMaker, "an instance of a subclass")
+    if config.ask == "unsure":
+        decision_maker = StandIn(decision_maker, config.seed, history)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
     return _Run(config, environment, decision_maker, population).events(state)
@@ -167,12 +173,12 @@ class _Run:
         started = time.perf_counter()
         answer = question.checked(self.decision_maker.respond(question))
         seconds = time.perf_counter() - started
-        chosen = question.chosen(answer)
+        chosen, asked = question.chosen(answer), question.was_asked(answer)
         state = replace(
             state,
             choice=chosen or state.choice,
-            questions=state.questions + 1,
-            policies_shown=state.policies_shown + len(question.shown),
+            questions=state.questions + asked,
+            policies_shown=state.policies_shown + asked * len(question.shown),
         )
         if question.purpose != "final":
             state = replace(state, search=self.method.answered(state, question, answer))

@@ -57,6 +57,7 @@ def config(small_config):
     )
 
 
+@pytest.mark.slow
 def test_no_key_is_used_twice(monkeypatch, config):
     drawn, derived = recorded(monkeypatch, config)
     layers, resets, orders = 4, 2 * 2, 2  # of an agent: initialised, at the start of two trainings, per iteration
@@ -66,6 +67,7 @@ def test_no_key_is_used_twice(monkeypatch, config):
     assert not derived & set(drawn)
 
 
+@pytest.mark.slow
 def test_a_key_that_is_used_twice_is_found(monkeypatch, config):
     collect = MOPPO.collect
 

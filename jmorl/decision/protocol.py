@@ -5,7 +5,7 @@ The run imports this; users implement it; neither knows the other.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from operator import index
 from typing import Any, Literal
 
@@ -65,6 +65,10 @@ class AnyQuestion(ABC):
     def stops(self, answer: Any) -> bool:
         """Return whether a checked answer ends the run with the policy it chose."""
         return False
+
+    def was_asked(self, answer: Any) -> bool:
+        """Return whether a checked answer is the decision maker's own, and not a stand-in's."""
+        return True
 
 
 @dataclass(frozen=True)
@@ -126,6 +130,10 @@ class Question(AnyQuestion):
         """Return whether the run shall end here."""
         return bool(answer.stop)
 
+    def was_asked(self, answer: Any) -> bool:
+        """Return whether a checked answer is the decision maker's own, and not a stand-in's."""
+        return not answer.stand_in
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -137,6 +145,8 @@ class Answer:
     policy: int
     stop: bool = False  # end the run here, with this policy
     generations: int = 1  # how many generations to go on before the next question, at least 1
+    stand_in: bool = False  # a stand-in answered, and nobody was asked (`jmorl.decision.stand_in`)
+    reason: str = field(default="", compare=False)  # why a stand-in did
 
     def __post_init__(self) -> None:
         policy = self.policy.id if isinstance(self.policy, Policy) else _whole("policy", self.policy, 0)

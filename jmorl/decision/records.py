@@ -12,6 +12,8 @@ An answer of E-NAUTILUS, where `shown` has the policies that the points head for
 with the answers {"point": index}, {"steps": back} and {"iterations_left": h, "points": n}. `stop`, `generations` and
 the `shown` of a decision may be left out of a log written by hand.
 
+A decision that a stand-in took has `"stand_in": true`, and format 3.
+
 An answer to a question of any other kind, where `answer` is as that kind writes it:
 
     {"format": 2, "purpose": "pair", "generation": 3, "answer": {"preferred": 17}, "shown": [...]}
@@ -28,7 +30,8 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, TypeAdapter, Validat
 from jmorl.decision.protocol import Answer, AnyQuestion, Choose, PointAnswer, PointQuestion, Question
 from jmorl.search.policy import Policy
 
-FORMAT = 2  # the newest of any record
+FORMAT = 3  # the newest of any record
+OTHER_KIND_FORMAT = 2
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Values = Annotated[tuple[Finite, ...], Field(min_length=1)]  # [M], raw units
@@ -61,7 +64,8 @@ class DecisionRecord:
     stop: bool = False
     generations: Annotated[int, Field(ge=1)] = 1
     shown: tuple[Shown, ...] = ()
-    format: Literal[1] = 1
+    stand_in: bool = False
+    format: Literal[1, 3] = 1
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,7 @@ def _kind(record: Any) -> str:
     """Return which kind of record the fields are of."""
     fields = record if isinstance(record, dict) else vars(record)
     known = {"steer": "decision", "final": "decision", "enautilus": "point"}
-    return known.get(str(fields.get("purpose")), "answer" if fields.get("format") == FORMAT else "")
+    return known.get(str(fields.get("purpose")), "answer" if fields.get("format") == OTHER_KIND_FORMAT else "")
 
 
 _RECORD: TypeAdapter[Record] = TypeAdapter(
@@ -135,6 +139,8 @@ def decision_record(question: Question, answer: Answer) -> DecisionRecord:
         answer.stop,
         answer.generations,
         _shown(question.front),
+        answer.stand_in,
+        3 if answer.stand_in else 1,
     )
 
 
@@ -145,7 +151,10 @@ def point_record(question: PointQuestion, answer: PointAnswer) -> PointRecord:
 
 def to_json(record: Record) -> str:
     """Return the record as one line, without a line break."""
-    return json.dumps({"format": record.format, **asdict(record)}, allow_nan=False)
+    fields = {"format": record.format, **asdict(record)}
+    if fields.get("stand_in") is False:
+        del fields["stand_in"]  # as in format 1, which did not have it
+    return json.dumps(fields, allow_nan=False)
 
 
 def from_json(line: str, name: str = "the record") -> Record:

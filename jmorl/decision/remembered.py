@@ -67,8 +67,13 @@ def is_of(record: RunRecord, question: AnyQuestion) -> bool:
     return np.allclose([shown.values for shown in record.shown], question.values)
 
 
+def by_stand_in(record: RunRecord) -> bool:
+    """Return whether a stand-in answered, which would answer the same again."""
+    return isinstance(record, DecisionRecord) and record.stand_in
+
+
 def answer_in(record: RunRecord, question: AnyQuestion) -> Any:
     """Return the answer that a record of the question holds."""
     if isinstance(record, DecisionRecord):
-        return Answer(record.policy, record.stop, record.generations)
+        return Answer(record.policy, record.stop, record.generations, record.stand_in)
     return question.from_json(record.answer)

@@ -65,7 +65,7 @@ class ScriptedUser(DecisionMaker):
             )
         index = self._find(record.policy, record.values, question.front, question.generation)
         stop = record.stop or (question.purpose == "steer" and steering is None)
-        return Answer(question.front[index].id, stop, record.generations)
+        return Answer(question.front[index].id, stop, record.generations, record.stand_in)
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
         """Return the answer to a question of E-NAUTILUS."""

@@ -1,18 +1,21 @@
 """The paper's method: PGMORL within bounds that follow from the policy somebody prefers (Algorithm 1)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from jmorl.decision.protocol import AnyQuestion, Question
-from jmorl.methods.base import Prospect
+from jmorl.methods.base import Prospect, Tasks
 from jmorl.methods.pgmorl import PGMORL, PGMORLState
-from jmorl.search.bounds import lower_bounds, members_within, within
+from jmorl.search.bounds import members_within, widened_bounds, within
+from jmorl.search.metrics import Utility
 from jmorl.search.pareto import non_dominated
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Policy, values_of
 from jmorl.state import RunState
+
+PATIENCE = 2  # generations with one choice, after which the search has stagnated
 
 
 class Interactive(PGMORL):
@@ -26,11 +29,33 @@ class Interactive(PGMORL):
         generation, objectives = run.generation + 1, self.problem.objectives
         return Question("steer", generation, objectives, run.archive.members, run.search.bounds, previous)
 
+    def tasks(self, run: RunState) -> Tasks:
+        """Return tasks within the bounds; while the same policy stays preferred, some of them anywhere."""
+        stays = run.search.generations_with_choice >= PATIENCE
+        outside = round(self.problem.search.outside_share * self.problem.agents) if stays else 0
+        if not outside:
+            return super().tasks(run)
+        generator = np.random.default_rng([self.problem.seed, run.generation])
+        unbounded = replace(
+            run, choice=None, search=replace(run.search, bounds=np.full_like(run.search.bounds, -np.inf))
+        )
+        parts = [self.selected(unbounded, super().candidates(run), outside, generator)]
+        if outside < self.problem.agents:
+            parts.insert(0, self.selected(run, self.candidates(run), self.problem.agents - outside, generator))
+        return Tasks(
+            [parent for part in parts for parent in part.parents],
+            np.concatenate([part.weights for part in parts]),
+            np.concatenate([part.predicted for part in parts]),
+            max(part.candidates for part in parts),
+        )
+
     def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> PGMORLState:
         """Return the state with the bounds that follow from the choice."""
-        assert run.choice is not None, "the question is about policies"
-        state: PGMORLState = run.search
-        return replace(state, bounds=self._bounds_after(run, run.choice), silent_generations=answer.generations)
+        assert run.choice is not None and isinstance(question, Question), "the question is about policies"
+        state = replace(run.search, silent_generations=answer.generations)
+        if run.choice.id != question.previous:
+            state = replace(state, generations_with_choice=0)
+        return self._bounded(run, state, run.choice)
 
     def asking_at_once(self, state: PGMORLState) -> PGMORLState:
         """Return the state without generations to go on for in silence."""
@@ -42,9 +67,16 @@ class Interactive(PGMORL):
         return inside if run.choice is None or run.choice in inside else [run.choice, *inside]
 
     def taken_in(self, run: RunState, offspring: Sequence[Policy], tasks: Any) -> PGMORLState:
-        """Return the state with the offspring, one generation nearer to the next question."""
+        """Return the state with the offspring, one generation nearer to the next question.
+
+        Bounds that give way do so anew: the offspring may lie within them.
+        """
         state = super().taken_in(run, offspring, tasks)
-        return replace(state, silent_generations=max(state.silent_generations - 1, 0))
+        state = replace(state, silent_generations=max(state.silent_generations - 1, 0))
+        if run.choice is None:
+            return state
+        state = replace(state, generations_with_choice=state.generations_with_choice + 1)
+        return self._bounded(run, state, run.choice) if self.problem.search.least_within else state
 
     def final_front(self, run: RunState) -> Sequence[Policy]:
         """Return the members of the archive within the bounds."""
@@ -56,14 +88,28 @@ class Interactive(PGMORL):
 
     def prospect(self, run: RunState, policy: Policy) -> Prospect:
         """Return which bounds a choice would set, what they would rule out, and what is expected within them."""
-        bounds = self._bounds_after(run, policy)
-        after = replace(run, search=replace(run.search, bounds=bounds), choice=policy)
+        search = self._bounded(run, run.search, policy)
+        after, bounds = replace(run, search=search, choice=policy), search.bounds
         expected = self.predictions(after, self.candidates(after)).reshape(-1, len(bounds))
         expected = expected[within(expected, bounds)]
         return Prospect(bounds, within(run.archive.values, bounds), expected[non_dominated(expected)])
 
-    def _bounds_after(self, run: RunState, chosen: Policy) -> np.ndarray:
-        """Return the bounds [M] that follow from a choice (the paper's equation 4)."""
+    def metrics(
+        self, run: RunState, utility: Utility, offspring: Sequence[Policy], tasks: Tasks | None
+    ) -> Mapping[str, float | None]:
+        """Return PGMORL's metrics, and how often the slack of the bounds was doubled."""
+        return {**super().metrics(run, utility, offspring, tasks), "widenings": run.search.widenings}
+
+    def _bounded(self, run: RunState, state: PGMORLState, chosen: Policy) -> PGMORLState:
+        """Return the state with the bounds that follow from a choice (the paper's equation 4), widened if need be."""
         values, search = run.archive.values, self.problem.search
-        unit = np.ptp(values, axis=0) if search.bounds_scale == "range" else np.ones(values.shape[1])
-        return lower_bounds(chosen.values, search.delta, unit)
+        spans = np.ptp(values, axis=0)
+        bounds = widened_bounds(
+            chosen.values,
+            search.delta,
+            spans if search.bounds_scale == "range" else np.ones_like(spans),
+            search.least_slack * spans,
+            values_of(state.buffer.members),
+            search.least_within,
+        )
+        return replace(state, bounds=bounds.lower, widenings=bounds.widenings)

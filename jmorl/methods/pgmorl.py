@@ -20,6 +20,8 @@ from jmorl.search.selection import select_tasks
 from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
 
+COUNTERS = ("silent_generations", "widenings", "generations_with_choice")
+
 
 @dataclass(frozen=True)
 class PGMORLState:
@@ -28,7 +30,10 @@ class PGMORLState:
     buffer: PerformanceBuffer
     records: Records
     bounds: np.ndarray  # [M] -inf where there is none; only the interactive method sets them
-    silent_generations: int = 0  # of the interactive method: generations to go before the next question
+    # Of the interactive method alone:
+    silent_generations: int = 0  # to go before the next question
+    widenings: int = 0  # of the bounds
+    generations_with_choice: int = 0  # trained since another policy was chosen
 
 
 class PGMORL(Method[PGMORLState]):
@@ -43,8 +48,12 @@ class PGMORL(Method[PGMORLState]):
 
         After a choice only what lies within the bounds counts as an improvement.
         """
+        generator = np.random.default_rng([self.problem.seed, run.generation])
+        return self.selected(run, self.candidates(run), self.problem.agents, generator)
+
+    def selected(self, run: RunState, continued: list[Policy], count: int, generator: np.random.Generator) -> Tasks:
+        """Return so many tasks that continue some of these policies."""
         search, state = self.problem.search, run.search
-        continued = self.candidates(run)
         scale = self._scale_of_gains(run)
         bounded = run.choice is not None and search.gain_within == "bounds"
         front = members_within(run.archive.members, state.bounds) if bounded else run.archive.members
@@ -58,9 +67,9 @@ class PGMORL(Method[PGMORLState]):
             scale.apply(self.predictions(run, continued)),
             scale.apply(values_of(front)),
             reference,
-            self.problem.agents,
+            count,
             search.sparsity_weight,
-            np.random.default_rng([self.problem.seed, run.generation]),
+            generator,
         )
         return Tasks(
             [continued[task.candidate] for task in tasks],
@@ -119,7 +128,7 @@ class PGMORL(Method[PGMORLState]):
         records = {f"records_{name}": array for name, array in vars(state.records).items() if len(array)}
         document = {
             "buffer": [policy.id for policy in state.buffer.members],
-            "silent_generations": state.silent_generations,
+            **{name: getattr(state, name) for name in COUNTERS},
         }
         return PackedSearch(document, {"bounds": state.bounds, **records}, state.buffer.members)
 
@@ -131,7 +140,8 @@ class PGMORL(Method[PGMORLState]):
         packed = names[0] in arrays
         records = Records(*(arrays[each] for each in names)) if packed else Records.empty(len(arrays["bounds"]))
         state = self._state(tuple(policies[each] for each in document["buffer"]), records)
-        return replace(state, bounds=arrays["bounds"], silent_generations=document["silent_generations"])
+        # Runs of earlier versions have fewer counters, and their bounds never gave way.
+        return replace(state, bounds=arrays["bounds"], **{name: document.get(name, 0) for name in COUNTERS})
 
     def _state(self, members: tuple[Policy, ...], records: Records) -> PGMORLState:
         search = self.problem.search

@@ -1,10 +1,13 @@
 """The part of objective space that a preferred policy leaves in play."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from jmorl.search.policy import Policy, values_of
+
+MOST_WIDENINGS = 7
 
 
 def lower_bounds(preferred: np.ndarray, delta: float, unit: np.ndarray) -> np.ndarray:
@@ -13,6 +16,31 @@ def lower_bounds(preferred: np.ndarray, delta: float, unit: np.ndarray) -> np.nd
     Equation 4 of the paper, whose s is 1; a unit of the objective's own makes the slack the same in every unit.
     """
     return preferred - delta * np.sqrt(unit * np.abs(preferred))
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Lower bounds, and how far they gave way."""
+
+    lower: np.ndarray  # [M]
+    widenings: int  # how often their slack was doubled
+
+
+def widened_bounds(
+    preferred: np.ndarray,  # [M]
+    delta: float,
+    unit: np.ndarray,  # [M] >= 0
+    least_slack: np.ndarray,  # [M] >= 0, whatever the preferred values
+    values: np.ndarray,  # [N, M]
+    least_within: int,
+) -> Bounds:
+    """Return `lower_bounds`, their slack doubled until so many of the vectors reach them, 7 times at most."""
+    slack = np.maximum(delta * np.sqrt(unit * np.abs(preferred)), least_slack)
+    for widenings in range(MOST_WIDENINGS + 1):
+        lower = preferred - 2**widenings * slack
+        if within(values, lower).sum() >= least_within:
+            break
+    return Bounds(lower, widenings)
 
 
 def within(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:

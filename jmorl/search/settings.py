@@ -16,6 +16,17 @@ class SearchConfig(Section):
     bounds_scale: Literal["range", "one"] = Field(
         "range", description="s in the bounds: the archive's range of each objective, or 1 (the paper)"
     )
+    least_slack: NonNegative = Field(
+        0.0, description="slack of the bounds at least, as a share of the archive's range; 0: none (the paper)"
+    )
+    least_within: Annotated[int, Field(ge=0)] = Field(
+        0,
+        description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
+    )
+    outside_share: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="interactive: share of the tasks outside the bounds while the choice stays; 0: none (the paper)",
+    )
     gain_within: Literal["bounds", "front"] = Field(
         "bounds", description="interactive: measure gains inside the bounds, or over the whole front (the paper)"
     )

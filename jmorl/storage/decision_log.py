@@ -30,6 +30,11 @@ class DecisionLog:
         if text != self._text():
             write_text(path, self._text())
 
+    @property
+    def answered(self) -> list[RunRecord]:
+        """The answers that the run is past."""
+        return _answers(self.past)
+
     def add(self, question: AnyQuestion, answer: Any) -> None:
         """Note an answer. One that was ahead is not written again."""
         record = record_of(question, answer)

@@ -13,7 +13,7 @@ from envs.core import Environment
 from jmorl.config import Config, ConfigError
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import DecisionRecord, ScriptError, read_log
-from jmorl.decision.remembered import Remembered
+from jmorl.decision.remembered import Remembered, by_stand_in
 from jmorl.decision.users import make_user
 from jmorl.display.commands import command
 from jmorl.events import Event
@@ -59,8 +59,9 @@ class Continued:
         """
         config, environment = self.folder.config, self.folder.environment
         user = user or self.user or make_user(config.user, environment.objectives)
-        remembered = Remembered(user, self.folder.decisions.ahead, asking)
-        for event in run(config, remembered, environment, self.state, population):
+        decisions = self.folder.decisions
+        remembered = Remembered(user, [record for record in decisions.ahead if not by_stand_in(record)], asking)
+        for event in run(config, remembered, environment, self.state, population, decisions.answered):
             self.folder.record(event)
             yield event
 

@@ -186,7 +186,7 @@ def without(fields: dict, name: str) -> dict:
     [
         ('{"format": 1, "purp', "is not valid JSON: .* at column"),
         ("[1, 2]", "is not a JSON object"),
-        (STEER | {"format": 3}, "has format 3, newer than the format 2 known here; use a newer jmorl"),
+        (STEER | {"format": 4}, "has format 4, newer than the format 3 known here; use a newer jmorl"),
         (STEER | {"format": 0}, "is not a decision: format: input should be 1"),
         (without(STEER, "purpose"), 'purpose: should be "steer", "final" or "enautilus"'),
         (STEER | {"purpose": "guess"}, 'purpose: should be "steer", "final" or "enautilus"'),

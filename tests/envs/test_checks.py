@@ -211,9 +211,9 @@ class LooksAskew(ThreeWays):
     [
         (KeepsTheGoal, "initial_state keeps a number in self.goal; .* belongs in `state`, .* comes from `key`$"),
         (KeepsTheLastState, "transition keeps a number in self.memory; "),
-        (CountsItsCalls, "transition is another function each time it is called; randomness comes from `key`, and"),
-        (StartsByNumpysChance, "initial_state is another function each time it is called"),
-        (LooksAskew, "observe is another function each time it is called"),
+        (CountsItsCalls, "transition computes something else each time it is called; randomness comes from `key`, and"),
+        (StartsByNumpysChance, "initial_state computes something else each time it is called"),
+        (LooksAskew, "observe computes something else each time it is called"),
     ],
 )
 def test_a_function_that_is_not_pure_is_named(kind, message):

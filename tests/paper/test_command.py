@@ -98,6 +98,7 @@ def in_threes(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_runs_that_share_a_program_find_what_each_finds_alone(out, in_threes):
     shared = []
     for cell in Plan(quick=True).cells(ITEMS["table1"], "raw"):

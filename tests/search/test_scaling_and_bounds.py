@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from jmorl.search.bounds import lower_bounds, within
+from jmorl.search.bounds import lower_bounds, widened_bounds, within
 from jmorl.search.scaling import range_scale, search_scale
 
 finite = st.floats(-1e4, 1e4)
@@ -80,6 +80,30 @@ def test_bounds_with_a_unit_do_not_depend_on_units(preferred: np.ndarray, unit: 
     bounds = lower_bounds(preferred, 0.1, unit)
     rescaled = lower_bounds(factor * preferred, 0.1, factor * unit)
     np.testing.assert_allclose(rescaled, factor * bounds, rtol=1e-9, atol=1e-12)
+
+
+@given(vectors, st.floats(0, 10), amounts, arrays(float, (5, 3), elements=st.floats(-1e3, 1e3)))
+def test_bounds_that_need_not_give_way_are_the_papers(
+    preferred: np.ndarray, delta: float, unit: np.ndarray, values: np.ndarray
+) -> None:
+    bounds = widened_bounds(preferred, delta, unit, np.zeros(3), values, 0)
+    np.testing.assert_array_equal(bounds.lower, lower_bounds(preferred, delta, unit))
+    assert bounds.widenings == 0
+
+
+def test_bounds_give_way_until_enough_lie_within() -> None:
+    preferred, unit = np.array([100.0, -4.0]), np.array([100.0, 4.0])  # so the slack is 0.1 times these
+    values = np.array([[100.0, -4.0], [81.0, -4.7], [65.0, -4.0], [-500.0, 0.0]])
+    for least, widenings in ((1, 0), (2, 1), (3, 2), (4, 6), (5, 7)):
+        bounds = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, least)
+        assert bounds.widenings == widenings
+        np.testing.assert_allclose(bounds.lower, preferred - 2**widenings * 0.1 * unit)
+
+
+def test_slack_may_have_a_least_that_does_not_depend_on_where_zero_lies() -> None:
+    unit, least = np.array([10.0, 10.0]), np.array([0.5, 0.5])
+    bounds = widened_bounds(np.array([0.0, -1000.0]), 0.1, unit, least, np.zeros((0, 2)), 0)
+    np.testing.assert_allclose(bounds.lower, [-0.5, -1010.0])
 
 
 def test_within_needs_every_objective() -> None:
