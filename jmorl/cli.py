@@ -156,10 +156,10 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
 
             @contextmanager
             def asking() -> Iterator[None]:
-                with watching.asking(), stop.asking():
+                with watching.asking(), stop.interruptible():
                     yield
 
-            for event in continued.events(asking=asking):
+            for event in continued.events(asking=asking, selecting=stop.interruptible):
                 watching.show(event)
                 if not isinstance(event, RunFinished):
                     stop.check()
@@ -212,7 +212,7 @@ def _studio(options: argparse.Namespace) -> None:
         try:
             _open(session, options)
             print(f"The studio is at {server.address(options.host, options.port, token)} (Ctrl-C ends it)", flush=True)
-            with stop.asking():
+            with stop.interruptible():
                 server.serve(session, options.host, options.port, token)
         except Interrupted as error:
             error.add_note(f"what the run has is kept; open it again with: {command('studio', session.view.path)}")

@@ -5,7 +5,8 @@ the command line, the run folder, a page, reads the same events. What is particu
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -42,13 +43,15 @@ def run(
     state: RunState | None = None,
     population: Population | None = None,
     history: Sequence[RunRecord] = (),
+    selecting: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
     An `environment` that is not the config's is refused with NotAsDeclared.
-    The `history` of its decisions is what a stand-in needs to know then (`ask` in the config).
+    The `history` of its decisions is what a stand-in needs to know then (`ask` in the config). The tasks of a
+    generation are selected within `selecting()`, where nothing is lost if it is broken off.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
     MethodError for tasks that cannot be trained; the events before it stand.
@@ -62,7 +65,7 @@ def run(
         decision_maker = StandIn(decision_maker, config.seed, history)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
-    return _Run(config, environment, decision_maker, population).events(state)
+    return _Run(config, environment, decision_maker, population, selecting).events(state)
 
 
 def _check_kind(name: str, value: object, kind: type, how: str) -> None:
@@ -107,12 +110,18 @@ class _Run:
     """What stays the same during a run, and the steps it is made of."""
 
     def __init__(
-        self, config: Config, environment: Environment[Any], decision_maker: DecisionMaker, population: Population
+        self,
+        config: Config,
+        environment: Environment[Any],
+        decision_maker: DecisionMaker,
+        population: Population,
+        selecting: Callable[[], AbstractContextManager[object]],
     ):
         self.config = config
         self.environment = environment
         self.decision_maker = decision_maker
         self.population = population
+        self.selecting = selecting
         self.method = make_method(config, environment)
         self.metric_weights = candidate_grid(len(environment.objectives), config.search.weight_divisions)
 
@@ -162,7 +171,8 @@ class _Run:
         """Train what the method asks for, and take the offspring in."""
         state = replace(state, generation=state.generation + 1)
         started = time.perf_counter()
-        tasks = checked_tasks(self.method.tasks(state), self.method.problem)
+        with self.selecting():
+            tasks = checked_tasks(self.method.tasks(state), self.method.problem)
         select_seconds = time.perf_counter() - started
         train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in tasks.parents))
         iterations = self.config.population.iterations

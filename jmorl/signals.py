@@ -27,7 +27,9 @@ class Interrupted(KeyboardInterrupt):
 
 
 class StopSignals:
-    """Within the block a signal is noted, and raised as Interrupted where it does no harm: in `check` and `asking`.
+    """Within the block a signal is noted, and raised as Interrupted where it does no harm.
+
+    That is in `check` and in `interruptible`.
 
     A compiled call cannot be broken off, and Python runs its own handlers only after it. So a thread reads the signals
     as they come: it says what will happen, and at the second ends the process there and then. For the main thread.
@@ -36,7 +38,7 @@ class StopSignals:
     def __init__(self, says: str = "stopping after this generation; once more to stop at once, without it"):
         self.says = says
         self.received: int | None = None
-        self._asking = False
+        self._at_once = False
 
     def __enter__(self) -> Self:
         self._read_end, self._write_end = socket.socketpair()  # a pipe would not do on every system
@@ -65,18 +67,18 @@ class StopSignals:
             raise Interrupted(self.received)
 
     @contextmanager
-    def asking(self) -> Iterator[None]:
-        """While somebody is asked, a signal is raised at once."""
-        self._asking = True
+    def interruptible(self) -> Iterator[None]:
+        """Within the block a signal is raised at once: while somebody is asked, or nothing but thought is lost."""
+        self._at_once = True
         try:
             self.check()
             yield
         finally:
-            self._asking = False
+            self._at_once = False
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self.received = number
-        if self._asking:
+        if self._at_once:
             raise Interrupted(number)
 
     def _watch(self) -> None:
@@ -87,5 +89,5 @@ class StopSignals:
             came += 1
             if came > 1:
                 os._exit(128 + numbers[0])
-            if not self._asking:
+            if not self._at_once:
                 print(f"jmorl: {self.says}", file=sys.stderr, flush=True)

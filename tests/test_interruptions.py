@@ -3,17 +3,18 @@
 import os
 import shutil
 import signal
-import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
 
 from jmorl.cli import main
+from jmorl.learning.population import Population
+from jmorl.methods.pgmorl import PGMORL
 from jmorl.storage import checkpoints
 from tests.resuming import outcome
 
-RUN = sys.modules["jmorl.loop"]
 NOBODY = 65534
 
 
@@ -31,16 +32,17 @@ def test_a_signal_ends_a_run_after_its_generation_and_says_how_to_go_on(
 ):
     config, path = tmp_path / "config.toml", tmp_path / "run"
     config.write_text(small_config.to_toml())
-    generation = RUN._Run.generation
+    training, calls = Population.train, []
 
-    def signalled(self, state):
-        if state.generation == 1:
+    def signalled(self, *arguments):
+        calls.append(arguments)
+        if len(calls) == 3:
             os.kill(os.getpid(), number)
-        return generation(self, state)
+        return training(self, *arguments)
 
     handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     with monkeypatch.context() as patch:
-        patch.setattr(RUN._Run, "generation", signalled)
+        patch.setattr(Population, "train", signalled)
         assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 128 + number
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == handlers
     errors = capsys.readouterr().err
@@ -49,6 +51,24 @@ def test_a_signal_ends_a_run_after_its_generation_and_says_how_to_go_on(
     assert len((path / "metrics.csv").read_text().splitlines()) == 1 + 3
     assert main(["train", "--config", str(config), "--out", str(path)]) == 2
     assert f"continue it with `jmorl resume {path}`" in capsys.readouterr().err
+    assert main(["resume", str(path), "--quiet"]) == 0
+    shutil.rmtree(path / "plots")
+    assert outcome(path) == outcome(whole)
+
+
+def test_a_signal_does_not_wait_for_a_selection(whole, small_config, tmp_path, monkeypatch, capsys):
+    config, path = tmp_path / "config.toml", tmp_path / "run"
+    config.write_text(small_config.to_toml())
+
+    def endless(method, run):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60)
+        raise AssertionError("the selection was not broken off")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(PGMORL, "tasks", endless)
+        assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 143
+    assert f"go on with: jmorl resume {path}" in capsys.readouterr().err
     assert main(["resume", str(path), "--quiet"]) == 0
     shutil.rmtree(path / "plots")
     assert outcome(path) == outcome(whole)
@@ -129,15 +149,16 @@ def test_a_read_only_folder_is_refused_in_words(unprivileged, small_config, caps
 def test_a_permission_lost_midway_loses_nothing(unprivileged, small_config, monkeypatch, capsys):
     config, path = unprivileged / "config.toml", unprivileged / "new"
     config.write_text(small_config.to_toml())
-    generation = RUN._Run.generation
+    training, calls = Population.train, []
 
-    def losing(self, state):
-        if state.generation == 1:
+    def losing(self, *arguments):
+        calls.append(arguments)
+        if len(calls) == 3:
             set_writable(path, False)
-        return generation(self, state)
+        return training(self, *arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(RUN._Run, "generation", losing)
+        patch.setattr(Population, "train", losing)
         assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 1
     errors = capsys.readouterr().err
     assert "Permission denied" in errors and "go on with: jmorl resume" in errors

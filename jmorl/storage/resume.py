@@ -52,16 +52,18 @@ class Continued:
         user: DecisionMaker | None = None,
         asking: Callable[[], AbstractContextManager[object]] = nullcontext,
         population: Population | None = None,
+        selecting: Callable[[], AbstractContextManager[object]] = nullcontext,
     ) -> Iterator[Event]:
         """Run on, recording every event before it is passed on; answers that the log has are not asked for again.
 
-        `user` takes the place of the run's own, and is asked within `asking()`; `population` is as in `run`.
+        `user` takes the place of the run's own, and is asked within `asking()`; `population` and `selecting` are as in
+        `run`.
         """
         config, environment = self.folder.config, self.folder.environment
         user = user or self.user or make_user(config.user, environment.objectives)
         decisions = self.folder.decisions
         remembered = Remembered(user, [record for record in decisions.ahead if not by_stand_in(record)], asking)
-        for event in run(config, remembered, environment, self.state, population, decisions.answered):
+        for event in run(config, remembered, environment, self.state, population, decisions.answered, selecting):
             self.folder.record(event)
             yield event
 
