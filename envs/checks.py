@@ -155,7 +155,7 @@ def _wrong_terminated(found: Any) -> Iterator[str]:
 
 
 def _kind(found: Any) -> str:
-    """Return what something is that is no array, or not one alone."""
+    """Name the kind of a result that is not a single array."""
     if isinstance(found, jax.ShapeDtypeStruct):
         return "an array"
     if isinstance(found, tuple | list):
@@ -164,7 +164,7 @@ def _kind(found: Any) -> str:
 
 
 def _changes(start: Any, after: Any) -> list[str]:
-    """Return what has another form after a step than after a reset."""
+    """Return the parts of the state whose form changes with a step."""
     if len({jax.tree.structure(start), jax.tree.structure(after)}) > 1:
         return ["the state after a step has other parts than that of a reset"]
     changes = []

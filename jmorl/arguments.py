@@ -52,7 +52,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return what the command line takes. `command` of the parsed options is the name of the one given."""
+    """Return the parser of the command line. `command` of the parsed options names the command."""
     whole = _Parser(
         prog="jmorl",
         description="Interactive multi-objective reinforcement learning: train a population, choose, converge.",
@@ -236,7 +236,7 @@ def _written(value: Any) -> str:
 
 
 def _whole(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Return what takes a whole number within bounds from the command line."""
+    """Return a parser of whole numbers within bounds."""
 
     def number(text: str) -> int:
         try:

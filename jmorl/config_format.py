@@ -73,7 +73,7 @@ def identity(settings: Mapping[str, Any]) -> str:
 
 
 def identity_of_format_1(settings: Mapping[str, Any]) -> str | None:
-    """Return what format 1 had instead, a hash of every setting; None for settings it could not have had."""
+    """Return the identity in format 1, a hash of every setting; None for settings that format 1 did not have."""
     flat = dict(flat_settings(settings))
     if any(flat[name] != BASELINE[name] for name in ADDED_SINCE_FORMAT_1):
         return None
@@ -91,7 +91,7 @@ def format_of(settings: Mapping[str, Any]) -> int | None:
 
 
 def before_settings_were_added() -> dict[str, Any]:
-    """Return what a file of an earlier format means where it says nothing, as nested settings."""
+    """Return the settings that a file of an earlier format leaves out, nested."""
     return _nested_settings(BASELINE)
 
 

@@ -98,7 +98,7 @@ def _programs(environment_id: str, most_steps: int | None) -> _Programs:
 
 
 def _arrays(policy: StoredPolicy) -> dict[str, Any]:
-    """Return what decides about an action."""
+    """Return the function that decides about an action."""
     return {
         "header": {"network": {name: policy.header["network"][name] for name in ("variance_floor", "clip")}},
         "layers": policy.layers,

@@ -120,14 +120,14 @@ _RECORD: TypeAdapter[Record] = TypeAdapter(
 
 
 def record_of(question: AnyQuestion, answer: Any) -> DecisionRecord | AnswerRecord:
-    """Return what the log keeps of a question in a run and of its checked answer."""
+    """Return the record of a question in a run and of its checked answer."""
     if isinstance(question, Question):
         return decision_record(question, answer)
     return AnswerRecord(question.purpose, question.generation, question.to_json(answer), _shown(question.shown))
 
 
 def decision_record(question: Question, answer: Answer) -> DecisionRecord:
-    """Return what the log keeps of a choice. Raise ValueError for a purpose that is never logged."""
+    """Return the record of a choice. Raise ValueError for a purpose that is never logged."""
     if question.purpose == "enautilus" or question.purpose == "pair":
         raise ValueError(f"a choice with the purpose {question.purpose!r} is logged as the question it belongs to")
     chosen = question.policy(answer.policy)
@@ -145,7 +145,7 @@ def decision_record(question: Question, answer: Answer) -> DecisionRecord:
 
 
 def point_record(question: PointQuestion, answer: PointAnswer) -> PointRecord:
-    """Return what the log keeps of a question of E-NAUTILUS and its answer."""
+    """Return the record of a question of E-NAUTILUS and its answer."""
     return PointRecord(question.generation, question.number, answer, _shown(question.representatives))
 
 

@@ -70,7 +70,7 @@ class StandIn(DecisionMaker):
 
 
 def _recorded(record: RunRecord) -> Choice | None:
-    """Return what a record tells of the user; None for one that tells nothing."""
+    """Return the choice in a record; None if the user did not make it, or had none."""
     if not isinstance(record, DecisionRecord) or by_stand_in(record) or len(record.shown) < 2:
         return None
     ids = [shown.policy for shown in record.shown]

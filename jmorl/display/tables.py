@@ -86,7 +86,7 @@ class PlainTable:
 
 
 def _spread(part: Sequence[int], least: Sequence[int], most: Sequence[int], width: int) -> dict[int, int]:
-    """Return what each column of a part gets: what it needs, and of what is left what it may use, from the first on."""
+    """Return each column's width: what it needs, and, from the first column on, as much of the rest as it may use."""
     left = max(width - _total([least[index] for index in part]), 0)
     widths = {}
     for index in part:

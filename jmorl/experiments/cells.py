@@ -61,5 +61,5 @@ def groups(cells: Sequence[Cell], most: int) -> Iterator[list[Cell]]:
 
 
 def shape(config: Config) -> Hashable:
-    """Return what is equal for runs that can share a program."""
+    """Return the key of a config; runs with equal keys can share a program."""
     return config.env, config.learning

@@ -60,7 +60,7 @@ def check_memory(environment: Environment[Any], config: LearningConfig, runs: in
 
 
 def needed_memory(environment: Environment[Any], config: LearningConfig, runs: int = 1) -> Needed:
-    """Return what a run, or so many side by side, needs."""
+    """Return the memory that a run, or so many runs side by side, needs."""
     ppo, evaluation, agents = config.ppo, config.evaluation, runs * config.agents
     o, a, m = environment.observation_size, environment.action_size, len(environment.objectives)
     parameters = sum(_parameters((o, *ppo.hidden_sizes, outputs)) for outputs in (a, m))
@@ -83,7 +83,7 @@ def _parameters(sizes: tuple[int, ...]) -> int:
 
 
 def machine_memory() -> int:
-    """Return what the processes of this machine, or of this one's control group, may use together, with swap."""
+    """Return the memory of this machine, or of the process's control group, with swap."""
     return min([psutil.virtual_memory().total, *_group_limits()]) + psutil.swap_memory().total
 
 

@@ -85,7 +85,7 @@ class Diagnostics(NamedTuple):
         return {name: float(getattr(self, name).mean()) for name in self._fields if not name.startswith("fault")}
 
     def cause(self, agent: int, objectives: Sequence[Objective]) -> str:
-        """Return what stopped being finite for an agent: `observation[3]`, `reward of energy`, or `loss`."""
+        """Name the number that stopped being finite for an agent: `observation[3]`, `reward of energy`, or `loss`."""
         fault, component = FAULTS[self.fault[agent]], int(self.fault_component[agent])
         match fault:
             case "observation":

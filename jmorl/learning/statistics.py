@@ -48,7 +48,7 @@ def normalize(statistics: RunningStatistics, x: jax.Array) -> jax.Array:
 
 
 def return_scale(statistics: RunningStatistics) -> jax.Array:
-    """Return what rewards are divided by: the standard deviation of their discounted sums, [M].
+    """Return the divisor of rewards: the standard deviation of their discounted sums, [M].
 
     An objective whose sums (next to) never vary has no scale of that kind and takes their size instead.
     """

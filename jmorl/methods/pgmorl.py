@@ -83,7 +83,7 @@ class PGMORL(Method[PGMORLState]):
         return list(run.search.buffer.members)
 
     def predictions(self, run: RunState, policies: Sequence[Policy]) -> np.ndarray:
-        """Return what policies are expected to become with each of the candidate weights, [C, W, M].
+        """Predict the values of policies after training with each of the candidate weights, [C, W, M].
 
         The model's constants are for values scaled by range, whatever scale the gains are measured in.
         """

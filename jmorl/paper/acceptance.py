@@ -54,7 +54,7 @@ def acceptance_verdict(published: PublishedTable, rows: Sequence[TargetRow]) -> 
 
 
 def _misses(pair: Pair, best: float) -> list[str]:
-    """Return what the criterion asks for and is not met. `best`: the successful share of the best published row."""
+    """Return the parts of the criterion that are not met. `best`: the successful share of the best published row."""
     ours, theirs = (row.times.successes / len(row.seeds) for row in pair.rows)
     return [
         *(["it succeeds less often than PGMORL"] if ours < theirs else []),

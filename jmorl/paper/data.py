@@ -90,7 +90,7 @@ def published() -> Published:
 
 @cache
 def honest(env: str) -> Honest:
-    """Return what was fixed for an environment id of the experiment."""
+    """Return the settings of the experiment for an environment id."""
     fixed = TypeAdapter(dict[str, str | Honest]).validate_json(_text("honest.json"))[env]
     assert isinstance(fixed, Honest)
     return fixed

@@ -110,7 +110,7 @@ def note_outside(axes: Axes, values: np.ndarray, limits: np.ndarray) -> None:
 
 
 def front_name(run: StoredRun) -> str:
-    """Return what the last known front is called."""
+    """Return the name of the last known front."""
     return "final front" if run.result else "front so far"
 
 

@@ -29,7 +29,7 @@ def run_tables(run: StoredRun) -> list[RenderableType]:
 
 
 def run_heading(run: StoredRun) -> RenderableType:
-    """Return what was run, on what, for how long, and how it ended."""
+    """Describe a run: its settings, its machine, how long it took, how it ended."""
     config, device = run.config, run.manifest["device"]
     steps, seconds = run.metrics["steps"][-1], run_seconds(run)
     rows = {
@@ -98,7 +98,7 @@ def decisions_table(run: StoredRun) -> PlainTable:
 
 
 def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> PlainTable:
-    """Return what fresh episodes [N] of a stored policy with this header brought, beside its score in the run."""
+    """Return a table of fresh episodes [N] of a stored policy with this header, beside its score in the run."""
     undiscounted = np.asarray(returns.undiscounted, float)
     spread = "std.\nerror", "std.\ndev.", "\nworst", "\nbest"
     table = PlainTable("\nobjective", "\nmean", *spread, "in its\nrun", "dis-\ncounted", words=["\nobjective"])

@@ -87,7 +87,7 @@ class Timeline:
         return self._seconds(now, left if self.phase == "generation" else left + 1)
 
     def _seconds(self, now: float, generations: int) -> float | None:
-        """Return what is left of the generation that is going on, and so many more."""
+        """Return the time that the present generation, and so many more, will take."""
         each = self.generation_seconds()
         if each is None:
             return None
@@ -95,7 +95,7 @@ class Timeline:
         return running + generations * each
 
     def _next(self, event: GenerationFinished | Resumed) -> "Timeline":
-        """Return what follows on a generation that ended."""
+        """Return the timeline after a generation has ended."""
         generation, silent = event.state.generation + 1, event.generations_to_question
         phase: Phase = "question" if silent == 0 or generation > self.generations else "generation"
         return replace(self, phase=phase, generation=generation, silent=silent)

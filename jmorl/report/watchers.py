@@ -175,7 +175,7 @@ class Json(Watcher):
 
 
 def question_name(decided: Decided) -> str:
-    """Return what was asked."""
+    """Describe the question."""
     return (
         "final choice"
         if decided.question.purpose == "final"

@@ -81,7 +81,7 @@ def _fit(x: np.ndarray, y: np.ndarray, importance: np.ndarray) -> np.ndarray:  #
 
 
 def fit_cost(parameters: np.ndarray, x: np.ndarray, y: np.ndarray, importance: np.ndarray) -> np.ndarray:  # [F]
-    """Return what `fit_tanh` minimises."""
+    """Return the loss that `fit_tanh` minimises."""
     squares = (importance * (tanh_curve(parameters, x) - y) / LOSS_SCALE) ** 2
     # q / (1 + sqrt(1 + q)) is sqrt(1 + q) - 1 without the cancellation near zero
     return LOSS_SCALE**2 * (squares / (1 + np.sqrt(1 + squares))).sum(axis=0)

@@ -74,7 +74,7 @@ def parsed_rows(text: str, name: str) -> list[dict[str, str]]:
 
 
 def current_name(column: str) -> str:
-    """Return what a column that an older version wrote is called now."""
+    """Return today's name of a column that an older version wrote."""
     first, underscore, rest = column.partition("_")
     return RENAMED.get(first, first) + underscore + rest if underscore else column
 

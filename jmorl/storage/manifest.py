@@ -71,7 +71,7 @@ def new_manifest(config: Config, parent: Manifest | None = None) -> Manifest:
 
 
 def circumstances() -> Manifest:
-    """Return what the last bits of a run's numbers may depend on."""
+    """Return the versions and the device on which the last bits of a run's numbers depend."""
     device = jax.devices()[0]
     return {
         "python": platform.python_version(),

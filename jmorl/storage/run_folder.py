@@ -147,7 +147,7 @@ class RunFolder:
         write_text(self.layout.front, csv_text(rows, list(rows[0])))
 
     def logs(self) -> dict[str, str]:
-        """Return what a checkpoint keeps of the logs."""
+        """Return the texts of the logs, by file name, for a checkpoint."""
         logs = {log.path.name: log.text for log in (self.metrics, self.policies)}
         return {**logs, self.decisions.path.name: self.decisions.past}
 
@@ -282,12 +282,12 @@ def _empty(layout: Layout) -> None:
 
 
 def folder_bytes(path: Path) -> int:
-    """Return what a folder has on the disk."""
+    """Return the size of a folder in bytes."""
     return sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
 
 
 def _leftovers(layout: Layout) -> set[Path]:
-    """Return what a process may leave that ended before the folder was a run. A run has begun with its config."""
+    """Return the files that a process leaves if it ends before the config is written, with which a run begins."""
     ours = {layout.lock, partial_path(layout.manifest), partial_path(layout.config)}
     try:
         read_manifest(layout.root)

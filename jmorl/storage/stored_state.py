@@ -22,7 +22,7 @@ class CannotContinue(ValueError):
 
 
 def read_start(path: Path) -> tuple[Manifest, Config]:
-    """Return what the run in a folder was started with. Raises CannotContinue and NewerFormat."""
+    """Read the manifest and the config of a run. Raises CannotContinue and NewerFormat."""
     layout = Layout(path)
     if not layout.manifest.exists():
         raise CannotContinue(f"{path} is not a run folder: it has no {layout.manifest.name}")
