@@ -219,5 +219,5 @@ def resident_bytes():
 
 
 def policy_bytes(state):
-    known = {policy.id: policy for policy in (*state.archive.members, *state.buffer.members)}
+    known = {policy.id: policy for policy in (*state.archive.members, *state.search.buffer.members)}
     return sum(leaf.nbytes for policy in known.values() for leaf in jax.tree.leaves(policy.snapshot))

@@ -10,13 +10,15 @@ from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, PointAns
 from jmorl.decision.records import DecisionRecord
 from jmorl.decision.remembered import RunRecord, by_stand_in
 
-TRUSTED_REGRET = 0.01  # share of the utility's range over the front
+# The expected regret up to which the stand-in answers, in shares of the utility's range over the front. A choice that
+# steers can be corrected in the next generation, the last one cannot.
+TRUSTED_REGRET = {"steer": 0.02, "final": 0.01}
 
 
 class StandIn(DecisionMaker):
     """Answers as `user` would, by a preference model of their answers, and asks them where it is not sure.
 
-    It is sure where its expected regret is below 1 % of the range of utility. `history` has the records of a run that
+    It is sure where its expected regret is small (`TRUSTED_REGRET`). `history` has the records of a run that
     goes on; only what the user said themselves counts. The same answers give the same posterior.
     """
 
@@ -27,7 +29,7 @@ class StandIn(DecisionMaker):
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind; only which policy of a front is preferred is answered here."""
-        if not isinstance(question, Question):
+        if not isinstance(question, Question) or question.purpose not in TRUSTED_REGRET:
             return self.user.respond(question)
         own = self._own_answer(question)
         if own:
@@ -45,10 +47,10 @@ class StandIn(DecisionMaker):
         if not self.choices:
             return None
         verdict = PreferenceModel(question.values, self.choices, self.seed).verdict()
-        if verdict.regret > TRUSTED_REGRET:
+        if verdict.regret > TRUSTED_REGRET[question.purpose]:
             return None
         policy = question.front[verdict.best].id
-        reason = f"your answers so far agree on policy {policy}: expected regret {verdict.regret:.1%} of the range"
+        reason = f"the answers so far agree on it: expected regret {verdict.regret:.1%} of the range of utility"
         return Answer(policy, stand_in=True, reason=reason)
 
     def answer(self, question: Question) -> Answer:

@@ -92,7 +92,7 @@ def decisions_table(run: StoredRun) -> PlainTable:
             cells = [f"{value:{fmt}}" for value, fmt in zip(record.values, formats, strict=True)]
             among = str(len(record.shown)) if record.shown else ""
             more = f"go on for {plural(record.generations, 'generation')}" if record.generations > 1 else ""
-            note = "stop" if record.stop else more
+            note = "by the stand-in" if record.stand_in else "stop" if record.stop else more
             table.add_row(str(record.generation), record.purpose, among, str(record.policy), *cells, note)
     return table
 

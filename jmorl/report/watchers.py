@@ -72,7 +72,8 @@ class Lines(Watcher):
             case GenerationFinished():
                 return self._generation_line(event)
             case Decided():
-                return f"{question_name(event)}: {choice_in_words(event, self.objectives)}"
+                why = "" if event.question.was_asked(event.answer) else f" ({event.answer.reason})"
+                return f"{question_name(event)}: {choice_in_words(event, self.objectives)}{why}"
             case RunFinished():
                 return f"finished: {REASONS[event.reason]}; the result is policy {event.chosen.id}"
 
@@ -110,10 +111,11 @@ class Json(Watcher):
          "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",
          "policy_loss", "value_loss", "entropy", "approximate_kl", "bounds",
          "front_size", "hypervolume", "expected_utility", "sparsity", "below_reference", "utility_max", "utility_mean",
-         "utility_mean_within_bounds", "prediction_error", "realized_change", "front": [policy, ...]}
+         "utility_mean_within_bounds", "prediction_error", "realized_change", "widenings" (interactive only),
+         "front": [policy, ...]}
         {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
          "bounds": that follow, "shown": how many policies, the fields of the answer ("stop", "generations": before the
-         next question), "seconds"}
+         next question, "stand_in": whether a stand-in answered, "reason": why), "seconds"}
         {"event": "finished", "reason": "budget", "satisfied" or "stopped", "chosen": policy}
 
     A policy is {"policy": its id, "generation", "parent", "weights", "values", "std"}.
@@ -175,12 +177,10 @@ class Json(Watcher):
 
 
 def question_name(decided: Decided) -> str:
-    """Describe the question."""
-    return (
-        "final choice"
-        if decided.question.purpose == "final"
-        else f"choice for generation {decided.question.generation}"
-    )
+    """Name the question, and who answered it if nobody was asked."""
+    question = decided.question
+    name = "final choice" if question.purpose == "final" else f"choice for generation {question.generation}"
+    return name if question.was_asked(decided.answer) else f"the stand-in's {name}"
 
 
 def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:

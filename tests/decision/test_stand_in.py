@@ -1,10 +1,13 @@
 """The stand-in: it asks where it is not sure, its answers are marked, and runs with it resume and replay exactly."""
 
+import shutil
+
 import numpy as np
 import pytest
 
 import envs
 from jmorl import Decided, PairQuestion, branch, read_run, run
+from jmorl.cli import main
 from jmorl.decision.protocol import Answer
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
 from jmorl.decision.scripted import ScriptedUser
@@ -48,10 +51,13 @@ def test_only_a_part_of_the_questions_reaches_the_user(config, small_config):
             assert utility(chosen.chosen.values[None]) >= worth.max() - 0.05 * np.ptp(worth)
 
 
-def test_the_log_tells_whose_an_answer_is(whole):
+def test_the_log_and_the_table_tell_whose_an_answer_is(whole, tmp_path, capsys):
     records = read_run(whole).decisions
     assert {record.stand_in for record in records} == {True, False}
     assert {(record.stand_in, record.format) for record in records} == {(True, 3), (False, 1)}
+    assert main(["show", str(shutil.copytree(whole, tmp_path / "copy"))]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if " steer " in line or " final " in line]
+    assert ["by the stand-in" in row for row in rows] == [record.stand_in for record in records]
     *_, last = read_run(whole).metrics["questions"]
     assert last == sum(not record.stand_in for record in records if record.purpose == "steer")
 
