@@ -11,7 +11,6 @@ import sys
 import time
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
 
@@ -21,6 +20,7 @@ from jmorl.events import GenerationFinished
 from jmorl.loop import make_method, run
 from jmorl.storage.checkpoints import CheckpointWriter, read_checkpoint, stored_generations
 from jmorl.storage.resume import resume
+from tests.probes import OneStep
 from tests.resuming import go_on, outcome, train
 
 pytestmark = pytest.mark.slow
@@ -201,17 +201,19 @@ def test_six_generations_are_three_and_three_more(small_config, tmp_path):
     assert outcome(three) == outcome(six)
 
 
-def test_memory_is_flat_over_fifty_generations(small_config, tmp_path):
-    """But for the policies that the archive keeps, once in the run and once in the checkpoint that is written."""
-    config = small_config.replace(steps=4 * 3 * 16 * 3 * 60, method="pgmorl", search={"buffer_bins": 6})
+def test_memory_is_flat_over_fifty_generations(small_config, tmp_path, monkeypatch):
+    """Where all policies are equally good: an archive that grows takes memory, and so do its checkpoints."""
+    monkeypatch.setitem(envs.registry, OneStep.id, OneStep)
+    config = small_config.replace(env=OneStep.id, user="A", steps=4 * 3 * 16 * 3 * 60, method="pgmorl")
     writer = CheckpointWriter(tmp_path, "run", 2, make_method(config, envs.make(config.env)))
     used = []
     for event in itertools.islice(run(config), 62):
         if isinstance(event, GenerationFinished):
             writer.save(event.state, {})
             writer.wait()
-            used.append(resident_bytes() - 2 * policy_bytes(event.state))
+            used.append(resident_bytes())
     writer.close()
+    assert len(event.state.archive.members) < 10
     assert used[60] - used[10] < 10e6
 
 
@@ -219,8 +221,3 @@ def resident_bytes():
     """The memory of this process, without what the allocator has free and keeps."""
     ctypes.CDLL(None).malloc_trim(0)
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-
-
-def policy_bytes(state):
-    known = {policy.id: policy for policy in (*state.archive.members, *state.search.buffer.members)}
-    return sum(leaf.nbytes for policy in known.values() for leaf in jax.tree.leaves(policy.snapshot))
