@@ -85,6 +85,9 @@ class Config(Section):
     ask: Literal["always", "unsure"] = Field(
         "always", description="whom: the user always, or only where their answers so far leave open what they prefer"
     )
+    question: Literal["front", "few"] = Field(
+        "front", description="what is shown: the whole front, or the five policies between which a choice tells most"
+    )
     seed: Annotated[int, Field(ge=0, lt=2**32)] = Field(1, description="of all randomness")
     population: PopulationConfig = PopulationConfig()
     ppo: PPOConfig = PPOConfig()

@@ -18,6 +18,7 @@ BASELINE: Mapping[str, Any] = {
     "method": "interactive",
     "user": "A",
     "ask": "always",
+    "question": "front",
     "seed": 1,
     "population.agents": 6,
     "population.warmup_iterations": 10,
@@ -61,7 +62,7 @@ BASELINE: Mapping[str, Any] = {
     "reference_point": [],
 }
 ADDED_SINCE_FORMAT_1 = frozenset(
-    {"ask", "population.weights", "search.least_slack", "search.least_within", "search.outside_share"}
+    {"ask", "question", "population.weights", "search.least_slack", "search.least_within", "search.outside_share"}
 )
 WITHOUT_EFFECT = frozenset({"checkpoints.keep"})  # on results
 

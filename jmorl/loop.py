@@ -50,8 +50,8 @@ def run(
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
     An `environment` that is not the config's is refused with NotAsDeclared.
-    The `history` of its decisions is what a stand-in needs to know then (`ask` in the config). The tasks of a
-    generation are selected within `selecting()`, where nothing is lost if it is broken off.
+    The `history` of its decisions is what a stand-in needs to know then (`ask` and `question` in the config). The
+    tasks of a generation are selected within `selecting()`, where nothing is lost if it is broken off.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
     MethodError for tasks that cannot be trained; the events before it stand.
@@ -61,8 +61,8 @@ def run(
     _check_kind("environment", environment, Environment, "as `envs.make` returns it")
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
     _check_kind("decision_maker", decision_maker, DecisionMaker, "an instance of a subclass")
-    if config.ask == "unsure":
-        decision_maker = StandIn(decision_maker, config.seed, history)
+    if config.ask == "unsure" or config.question == "few":
+        decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
     return _Run(config, environment, decision_maker, population, selecting).events(state)
@@ -181,7 +181,8 @@ class _Run:
     def ask(self, state: RunState, question: AnyQuestion) -> tuple[RunState, Decided]:
         """Put a question to the decision maker. Returns the state with the answer, and the event."""
         started = time.perf_counter()
-        answer = question.checked(self.decision_maker.respond(question))
+        question, answer = self.decision_maker.decide(question)
+        answer = question.checked(answer)
         seconds = time.perf_counter() - started
         chosen, asked = question.chosen(answer), question.was_asked(answer)
         state = replace(

@@ -60,6 +60,20 @@ class PreferenceModel:
         regret = float((utilities.max(axis=1) - utilities[:, best]).mean())
         return Verdict(best, regret, float((utilities.argmax(axis=1) == best).mean()))
 
+    def telling(self, count: int, always: Sequence[int] = ()) -> list[int]:
+        """Return rows of the front whose comparison tells most: `always`, and others up to `count`, in order.
+
+        Each is the one that most raises the expected utility of the best of them (qEUBO, Astudillo et al. 2023).
+        """
+        utilities = self.utilities(self.front)  # [S, N]
+        rows = list(dict.fromkeys(always))
+        while len(rows) < min(count, len(self.front)):
+            best = utilities[:, rows].max(axis=1, keepdims=True, initial=-np.inf)
+            gains = np.maximum(utilities, best).mean(axis=0)
+            gains[rows] = -np.inf
+            rows.append(int(gains.argmax()))
+        return sorted(rows)
+
 
 def _posterior(
     scale: Scale, front: np.ndarray, choices: Sequence[Choice], generator: np.random.Generator

@@ -5,7 +5,7 @@ The run imports this; users implement it; neither knows the other.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from operator import index
 from typing import Any, Literal
 
@@ -87,18 +87,25 @@ class Question(AnyQuestion):
     front: tuple[Policy, ...]
     bounds: np.ndarray  # [M] those in force; -inf before the first choice
     previous: int | None  # id of the policy chosen last
+    others: tuple[Policy, ...] = ()  # that may be chosen, too, but are shown only if somebody wants to see them
 
     @property
     def shown(self) -> tuple[Policy, ...]:
         """The front."""
         return self.front
 
+    @property
+    def whole(self) -> "Question":
+        """The same question with all policies shown."""
+        return replace(self, front=(*self.front, *self.others), others=())
+
     def policy(self, policy_id: int) -> Policy:
-        """Return the member of the front with this id. Raise ValueError if there is none."""
-        for policy in self.front:
+        """Return the policy with this id, shown or not. Raise ValueError if there is none."""
+        policies = (*self.front, *self.others)
+        for policy in policies:
             if policy.id == policy_id:
                 return policy
-        raise ValueError(f"policy {policy_id} is not among the policies shown: {[policy.id for policy in self.front]}")
+        raise ValueError(f"policy {policy_id} is not among the policies shown: {[policy.id for policy in policies]}")
 
     def put_to(self, user: "DecisionMaker") -> Any:
         """Return `user.answer(self)`."""
@@ -312,6 +319,10 @@ class DecisionMaker(ABC):
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind. Raise AnswerError for an answer that it does not allow."""
         return question.checked(question.put_to(self))
+
+    def decide(self, question: AnyQuestion) -> tuple[AnyQuestion, Any]:
+        """Return the question as it was asked, and the answer: a stand-in may ask about fewer policies."""
+        return question, self.respond(question)
 
     def compare(self, question: PairQuestion) -> int | None:
         """Return the id of the preferred one of two policies, or None for no difference; here: as `answer` has it."""

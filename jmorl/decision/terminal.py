@@ -21,6 +21,7 @@ POLICY_HELP = """\
   12           choose policy 12
   Enter        keep your last choice
   {more:<12} list the policies with the most of an objective first
+  all          list every policy, where only some are shown; the others can be chosen, too
   12 go 5      choose policy 12, then no question for 5 generations (or go 5)
   12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)
   ?            this help"""
@@ -49,6 +50,10 @@ class TerminalUser(DecisionMaker):
         show_front(self.console, question, by=0)
         while True:
             line = self._line("policy (? for help) > ")
+            if line and line.strip().lower() == "all" and question.others:
+                question = question.whole
+                show_front(self.console, question, by=0)
+                continue
             reply = policy_reply(question, "q" if line is None else line)
             match reply:
                 case Answer():
@@ -140,7 +145,7 @@ def point_reply(question: PointQuestion, line: str) -> PointAnswer | str:
 
 def _policy(question: Question, named: str | None) -> int | str:
     """Return the id of the policy somebody named, or of the last choice; a sentence if the front has no such policy."""
-    ids, previous = [policy.id for policy in question.front], question.previous
+    ids, previous = [policy.id for policy in question.whole.front], question.previous
     hint = f"choose a policy by its number, for example {ids[0]}, or type ? for help"
     if named is None and previous is None:
         return f"There is no last choice yet; {hint}."

@@ -20,6 +20,8 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
     table = front_table(
         question.front, question.objectives, previous_id=question.previous, by=by, bounds=question.bounds
     )
+    if question.others:
+        heading += f" (all lists {plural(len(question.others), 'other')}.)"
     _show(console, heading, table)
     chosen = [policy.values for policy in question.front if policy.id == question.previous]
     marks, legend = ({"x": chosen[0]}, "o: a policy, x: your last choice") if chosen else ({}, "o: a policy")

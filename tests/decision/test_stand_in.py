@@ -1,12 +1,13 @@
 """The stand-in: it asks where it is not sure, its answers are marked, and runs with it resume and replay exactly."""
 
 import shutil
+from typing import Any
 
 import numpy as np
 import pytest
 
 import envs
-from jmorl import Decided, PairQuestion, branch, read_run, run
+from jmorl import Decided, DecisionMaker, PairQuestion, branch, read_run, run
 from jmorl.cli import main
 from jmorl.decision.protocol import Answer
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
@@ -110,3 +111,53 @@ def test_a_branch_knows_what_was_answered_before_it(whole, config, tmp_path):
     user = Counting(config)
     follow(branch(whole, 6, tmp_path / "branch"), user=user)
     assert len(user.asked) < questions(whole)
+
+
+@pytest.mark.parametrize("ask", ["always", "unsure"])
+def test_short_questions_show_few_policies_and_lead_to_the_same(small_config, ask, tmp_path):
+    config = small_config.replace(question="few", ask=ask, steps=4 * 3 * 16 * 26)
+    utility = make_user(config.user, envs.make(config.env).objectives).utility
+    path = train(tmp_path / "run", config)
+    events = decisions(run(config))
+    asked = [event for event in events if not event.answer.stand_in]
+    assert ask == "unsure" or len(asked) == len(events)
+    for event in asked:
+        question: Any = event.question
+        assert len(question.front) == min(5, len(question.front) + len(question.others))
+        assert question.previous is None or question.previous in [each.id for each in question.whole.front]
+        worth = utility(question.whole.values)
+        assert worth.max() - utility(event.chosen.values[None])[0] <= 0.1 * np.ptp(worth)
+    assert any(len(event.question.shown) == 5 for event in asked)
+    records = read_run(path).decisions
+    assert [[shown.policy for shown in record.shown] for record in records] == [
+        [policy.id for policy in event.question.shown] for event in events
+    ]
+    broken = train(tmp_path / "broken", config, events=7)
+    go_on(broken)
+    assert outcome(broken) == outcome(path)
+    replayed = decisions(run(config, ScriptedUser(path / "decisions.jsonl")))
+    assert [event.chosen.id for event in replayed] == [event.chosen.id for event in events]
+
+
+def test_who_chooses_from_the_others_has_seen_them_all(ask):
+    class Last(DecisionMaker):
+        def answer(self, question):
+            return Answer(question.others[-1].id)
+
+    question = ask([[k, 9 - k] for k in range(10)], previous=12)
+    asked: Any
+    asked, answer = StandIn(Last(), 0, ask="always", shows="few").decide(question)
+    assert not asked.others and {policy.id for policy in asked.front} == {policy.id for policy in question.front}
+    assert asked.checked(answer) == answer
+
+
+def test_a_short_question_has_the_last_choice_and_is_spread_over_the_front(ask):
+    asked = []
+
+    class First(DecisionMaker):
+        def answer(self, question):
+            asked.append([policy.id for policy in question.front])
+            return Answer(question.front[0].id)
+
+    StandIn(First(), 0, ask="always", shows="few").decide(ask([[k, 9 - k] for k in range(10)], previous=12))
+    assert len(asked[0]) == 5 and 12 in asked[0] and min(asked[0]) <= 11 and max(asked[0]) >= 18

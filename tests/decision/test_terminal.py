@@ -2,6 +2,7 @@
 
 import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,6 +177,16 @@ def test_more_lists_the_front_by_that_objective(ask, line):
     session = Session(line, "10")
     session.user.answer(ask(VALUES))
     assert order_shown(session) == [["11", "10", "12"], ["12", "10", "11"]]
+
+
+def test_all_lists_the_policies_that_a_short_question_leaves_out(ask):
+    question = ask(VALUES)
+    short = replace(question, front=question.front[:2], others=question.front[2:])
+    session = Session("all", "12")
+    assert session.user.answer(short) == Answer(12)
+    before, after = session.output.split("12 ", 1)[0], session.output
+    assert "(all lists 1 other.)" in before and "-20.0" not in before and "-20.0" in after
+    assert Session("12").user.answer(short) == Answer(12)
 
 
 def test_an_ambiguous_objective_is_asked_for_again(ask):
