@@ -50,7 +50,7 @@ class TerminalUser(DecisionMaker):
         show_front(self.console, question, by=0)
         while True:
             line = self._line("policy (? for help) > ")
-            if line and line.strip().lower() == "all" and question.others:
+            if line and line.strip().lower() == "all":
                 question = question.whole
                 show_front(self.console, question, by=0)
                 continue
