@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, PointAnswer, PointQuestion, Question
+from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Question
 from jmorl.decision.records import AnswerRecord, DecisionRecord
+from jmorl.decision.wrapper import Wrapper
 
 RunRecord = DecisionRecord | AnswerRecord  # of a question that a run asks
 
 
-class Remembered(DecisionMaker):
+class Remembered(Wrapper):
     """Answers as recorded the questions that the records are of, and passes all others on to `user`.
 
     A record is of a question that shows the same policies, with values equal up to rounding: where a run is resumed
@@ -26,7 +27,7 @@ class Remembered(DecisionMaker):
         records: Sequence[RunRecord] = (),
         asking: Callable[[], AbstractContextManager[object]] = nullcontext,
     ):
-        self.user = user
+        super().__init__(user)
         self.records = list(records)
         self.asking = asking
 
@@ -34,28 +35,12 @@ class Remembered(DecisionMaker):
         """Return the answer to a question of any kind."""
         if self.records:
             record = self.records.pop(0)
-            if is_of(record, question):
+            whole = question.whole if isinstance(question, Question) else question  # which somebody may have seen
+            if is_of(record, question) or is_of(record, whole):
                 return answer_in(record, question)
             self.records.clear()
         with self.asking():
             return self.user.respond(question)
-
-    def answer(self, question: Question) -> Answer:
-        """Return the preferred member of the question's front."""
-        answer: Answer = self.respond(question)
-        return answer
-
-    def choose_point(self, question: PointQuestion) -> PointAnswer:
-        """Return the answer to a question of E-NAUTILUS."""
-        return self.user.choose_point(question)
-
-    def utility(self, values: np.ndarray) -> np.ndarray | None:
-        """Return the utilities [N] of objective vectors [N, M]; None without a utility."""
-        return self.user.utility(values)
-
-    def satisfied(self, values: np.ndarray) -> bool:
-        """Return whether a run with the front `values` [N, M] may stop early."""
-        return self.user.satisfied(values)
 
 
 def is_of(record: RunRecord, question: AnyQuestion) -> bool:

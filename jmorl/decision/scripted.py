@@ -63,9 +63,10 @@ class ScriptedUser(DecisionMaker):
                 f"{self.path} has no decision for generation {question.generation}, only for {generations}; add that "
                 "decision to it, or replay it with the settings of the run that wrote it"
             )
-        index = self._find(record.policy, record.values, question.front, question.generation)
+        policies = question.whole.front
+        index = self._find(record.policy, record.values, policies, question.generation)
         stop = record.stop or (question.purpose == "steer" and steering is None)
-        return Answer(question.front[index].id, stop, record.generations, record.stand_in)
+        return Answer(policies[index].id, stop, record.generations, record.stand_in)
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
         """Return the answer to a question of E-NAUTILUS."""

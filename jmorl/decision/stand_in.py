@@ -7,9 +7,10 @@ from typing import Any, Literal
 import numpy as np
 
 from jmorl.decision.preferences import Choice, PreferenceModel
-from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, PointAnswer, PointQuestion, Question
+from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Question
 from jmorl.decision.records import DecisionRecord
 from jmorl.decision.remembered import RunRecord, by_stand_in
+from jmorl.decision.wrapper import Wrapper
 
 # The expected regret up to which the stand-in answers, in shares of the utility's range over the front. A choice that
 # steers can be corrected in the next generation, the last one cannot.
@@ -17,7 +18,7 @@ TRUSTED_REGRET = {"steer": 0.02, "final": 0.01}
 FEW = 5  # policies in a short question
 
 
-class StandIn(DecisionMaker):
+class StandIn(Wrapper):
     """Answers as `user` would, by a preference model of their answers, and asks them where it is not sure.
 
     It is sure where its expected regret is small (`TRUSTED_REGRET`); with `ask` "always" it never is. With `shows`
@@ -34,7 +35,7 @@ class StandIn(DecisionMaker):
         ask: Literal["always", "unsure"] = "unsure",
         shows: Literal["front", "few"] = "front",
     ):
-        self.user = user
+        super().__init__(user)
         self.seed = seed
         self.choices = [choice for choice in map(_recorded, history) if choice]
         self.ask = ask
@@ -80,23 +81,6 @@ class StandIn(DecisionMaker):
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""
         return self.decide(question)[1]
-
-    def answer(self, question: Question) -> Answer:
-        """Return the preferred member of the question's front."""
-        answer: Answer = self.respond(question)
-        return answer
-
-    def choose_point(self, question: PointQuestion) -> PointAnswer:
-        """Return the user's answer to a question of E-NAUTILUS."""
-        return self.user.choose_point(question)
-
-    def utility(self, values: np.ndarray) -> np.ndarray | None:
-        """Return the user's utilities [N] of objective vectors [N, M]; None without a utility."""
-        return self.user.utility(values)
-
-    def satisfied(self, values: np.ndarray) -> bool:
-        """Return whether a run with the front `values` [N, M] may stop early."""
-        return self.user.satisfied(values)
 
 
 def _recorded(record: RunRecord) -> Choice | None:

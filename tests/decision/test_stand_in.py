@@ -151,6 +151,29 @@ def test_who_chooses_from_the_others_has_seen_them_all(ask):
     assert asked.checked(answer) == answer
 
 
+def test_a_choice_from_the_others_is_remembered_and_replayed(small_config, tmp_path):
+    """Its record has all policies, though the question will show few."""
+
+    class Last(Counting):
+        def answer(self, question):
+            self.asked.append(question.generation)
+            return Answer(question.whole.front[-1].id)
+
+    config = small_config.replace(question="few", steps=4 * 3 * 16 * 17)
+    whole = train(tmp_path / "whole", config, user=Last(config))
+    assert any(len(record.shown) > 5 for record in read_run(whole).decisions)
+    path = shutil.copytree(whole, tmp_path / "copy")
+    (path / "result.json").unlink()
+    for generation in (4, 5):
+        shutil.rmtree(path / "checkpoints" / f"{generation:05d}")
+    user = Last(config)
+    go_on(path, user=user)
+    assert not user.asked
+    assert outcome(path) == outcome(whole)
+    replayed = decisions(run(config, ScriptedUser(whole / "decisions.jsonl")))
+    assert [event.chosen.id for event in replayed] == [record.policy for record in read_run(whole).decisions]
+
+
 def test_a_short_question_has_the_last_choice_and_is_spread_over_the_front(ask):
     asked = []
 

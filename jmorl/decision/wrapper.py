@@ -1,0 +1,35 @@
+"""A decision maker around another one, which decides for itself whom to ask."""
+
+from typing import Any
+
+import numpy as np
+
+from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, PointAnswer, PointQuestion, Question
+
+
+class Wrapper(DecisionMaker):
+    """Passes everything on to `user`; a subclass says in `respond` what it does not."""
+
+    def __init__(self, user: DecisionMaker):
+        self.user = user
+
+    def respond(self, question: AnyQuestion) -> Any:
+        """Return the answer to a question of any kind."""
+        return self.user.respond(question)
+
+    def answer(self, question: Question) -> Answer:
+        """Return the preferred member of the question's front."""
+        answer: Answer = self.respond(question)
+        return answer
+
+    def choose_point(self, question: PointQuestion) -> PointAnswer:
+        """Return the user's answer to a question of E-NAUTILUS."""
+        return self.user.choose_point(question)
+
+    def utility(self, values: np.ndarray) -> np.ndarray | None:
+        """Return the user's utilities [N] of objective vectors [N, M]; None without a utility."""
+        return self.user.utility(values)
+
+    def satisfied(self, values: np.ndarray) -> bool:
+        """Return whether a run with the front `values` [N, M] may stop early."""
+        return self.user.satisfied(values)
