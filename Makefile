@@ -17,7 +17,7 @@ studio: $(INSTALLED)  ## steer a run on MountainCar yourself, on a web page; the
 	$(BIN)/jmorl studio --env mo-mountaincarcontinuous-v0
 
 test: $(INSTALLED)  ## the test suite (a few minutes), the files spread over the cores
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
 
 test-slow: $(INSTALLED)  ## the tests that take minutes each: physics, interrupted runs, learning
 	$(BIN)/python -m pytest -m slow
