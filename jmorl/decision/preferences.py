@@ -5,7 +5,7 @@ An answer is likely under a utility as a softmax of the utilities of what was sh
 how sharp it is and how large the share are inferred, too (Bradley and Terry 1952; Zintgraf et al. 2018). The posterior
 is a sample: particles from the prior, resampled by likelihood and moved by Metropolis-Hastings.
 
-Letters: S particles, L temperatures and shares, K policies shown, N policies, M objectives.
+Letters: S particles, K policies shown, N policies, M objectives.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ import numpy as np
 
 from jmorl.search.scaling import Scale, range_scale
 
-PARTICLES, DRAWN = 512, 4096  # that are kept, and from which they are resampled
-MOVES, STEP = 24, 0.4  # of Metropolis-Hastings: how many, and their standard deviation
+PARTICLES, DRAWN = 512, 2048  # that are kept, and from which they are resampled
+MOVES, STEP = 16, 0.4  # of Metropolis-Hastings: how many, and their standard deviation
 TEMPERATURES = (0.003, 0.01, 0.03, 0.1)  # of the softmax, in shares of the utility's range over the front
 RANDOM_SHARES = (0.02, 0.25)  # of answers
 AUGMENTATION = 0.05  # weight of the mean in utilities that look at the worst objective
@@ -51,7 +51,11 @@ class PreferenceModel:
 
     def utilities(self, values: np.ndarray) -> np.ndarray:
         """Return what vectors [N, M] are worth to each particle [S, N]; the front's worst is 0, its best 1."""
-        return _scaled_utilities(self._kinds, self._parameters, self.scale.apply(values), self.scale.apply(self.front))
+        found, of_front = (
+            _utilities(self._kinds, self._parameters, self.scale.apply(each)) for each in (values, self.front)
+        )
+        least, span = _range(of_front)
+        return (found - least[:, None]) / span[:, None]
 
     def verdict(self) -> Verdict:
         """Return which member of the front is best by expectation."""
@@ -122,36 +126,48 @@ def _log_likelihood(
     kinds: np.ndarray, parameters: np.ndarray, choices: Sequence[tuple[np.ndarray, int]], ends: np.ndarray
 ) -> np.ndarray:  # [S]
     """Return the likelihood of all choices, averaged over temperatures and shares of random answers."""
-    temperatures, shares = np.meshgrid(TEMPERATURES, RANDOM_SHARES)
-    inverse, share = 1 / temperatures.ravel()[:, None], shares.ravel()[:, None]  # [L, 1]
-    total = np.zeros((inverse.size, len(kinds)))  # [L, S]
+    total = np.zeros((len(TEMPERATURES), len(RANDOM_SHARES), len(kinds)))  # of all pairs of both, [T, R, S]
+    shares = np.array(RANDOM_SHARES)[:, None]
+    _, span = _range(_utilities(kinds, parameters, ends))
     for shown, preferred in choices:
-        utilities = _scaled_utilities(kinds, parameters, shown, ends)  # [S, K]
-        behind = utilities.max(axis=1, keepdims=True) - utilities
-        odds = np.exp(-inverse[..., None] * behind)  # [L, S, K]
-        total += np.log((1 - share) * odds[..., preferred] / odds.sum(axis=-1) + share / len(shown))
-    return np.logaddexp.reduce(total, axis=0) - np.log(len(total))
+        utilities = _utilities(kinds, parameters, shown)  # [S, K]
+        behind = (utilities.max(axis=1, keepdims=True) - utilities) / span[:, None]
+        for number, temperature in enumerate(TEMPERATURES):
+            odds = np.exp(behind / np.float32(-temperature))
+            probability = odds[:, preferred] / odds.sum(axis=1)
+            total[number] += np.log((1 - shares) * probability + shares / len(shown))
+    pairs = total.reshape(-1, len(kinds))
+    return np.logaddexp.reduce(pairs, axis=0) - np.log(len(pairs))
 
 
-def _scaled_utilities(kinds: np.ndarray, parameters: np.ndarray, values: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return the utilities [S, N] of scaled vectors, 0 and 1 being the least and greatest of the front's `ends`."""
-    of_ends, found = (_utilities(kinds, parameters, each) for each in (ends, values))
-    least, greatest = of_ends.min(axis=1, keepdims=True), of_ends.max(axis=1, keepdims=True)
-    return (found - least) / np.where(greatest > least, greatest - least, 1.0)
+def _range(utilities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # [S, N] -> [S], [S]
+    """Return each particle's least utility, and how far above it the greatest is; 1 where all are equal."""
+    least, greatest = utilities.min(axis=1), utilities.max(axis=1)
+    return least, np.where(greatest > least, greatest - least, 1)
 
 
-def _utilities(kinds: np.ndarray, parameters: np.ndarray, values: np.ndarray) -> np.ndarray:  # [S, N]
-    found = np.empty((len(kinds), len(values)))
+def _utilities(kinds: np.ndarray, parameters: np.ndarray, values: np.ndarray) -> np.ndarray:  # [S, N] float32
+    """Return the utilities of scaled vectors [N, M]. In float32: they are many, and never exact."""
+    found = np.empty((len(kinds), len(values)), np.float32)
+    parameters, values = parameters.astype(np.float32), values.astype(np.float32)
     largest = parameters.max(axis=1, keepdims=True)
     weights = np.exp(parameters - largest)
     weights /= weights.sum(axis=1, keepdims=True)
     points = 1 / (1 + np.exp(-parameters))
     linear, chebyshev, aspiration = (kinds == kind for kind in (LINEAR, CHEBYSHEV, ASPIRATION))
     found[linear] = weights[linear] @ values.T
-    found[chebyshev] = _worst(weights[chebyshev][:, None] * (values - 1))
-    found[aspiration] = _worst(values - points[aspiration][:, None])
+    found[chebyshev] = _worst(weights[chebyshev], values - 1)
+    found[aspiration] = _worst(np.ones_like(points[aspiration]), values, points[aspiration])
     return found
 
 
-def _worst(parts: np.ndarray) -> np.ndarray:  # [S, N, M] -> [S, N]
-    return parts.min(axis=-1) + AUGMENTATION * parts.mean(axis=-1)
+def _worst(weights: np.ndarray, values: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+    """Return the least of weighted values [N, M], less points [S, M], and a share of their mean: [S, N]."""
+    parts = [
+        np.outer(weights[:, index], column) - (0 if points is None else points[:, index, None])
+        for index, column in enumerate(values.T)
+    ]
+    least, total = parts[0], parts[0]
+    for part in parts[1:]:
+        least, total = np.minimum(least, part), total + part
+    return least + np.float32(AUGMENTATION / len(parts)) * total
