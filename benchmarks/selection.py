@@ -3,7 +3,8 @@
     python -m benchmarks.selection      (a minute)
 
 400 candidates that hardly dominate each other, all of them in the front, 600 records and the default grid of weights:
-about what a run of a hundred generations has. The seconds of the metrics are those of the front's row in metrics.csv.
+about what a run of a hundred generations has. The preference model knows six choices among all 400. The seconds of the
+metrics are those of the front's row in metrics.csv.
 """
 
 import time
@@ -14,19 +15,21 @@ import numpy as np
 from rich.table import Table
 
 from jmorl.config import SearchConfig
+from jmorl.decision.preferences import Choice, PreferenceModel
 from jmorl.display.console import PlainConsole
 from jmorl.search.metrics import front_metrics
 from jmorl.search.prediction import Records, predict
 from jmorl.search.selection import select_tasks
 from jmorl.search.weights import candidate_grid
 
-CANDIDATES, RECORDS, TASKS = 400, 600, 6
+CANDIDATES, RECORDS, TASKS, CHOICES = 400, 600, 6, 6
 OBJECTIVES = range(2, 9)
 
 
 def main() -> None:
     """Measure and print."""
-    shown = Table("objectives", "weights", "predict", "select", "together", "metrics", title="seconds of a generation")
+    columns = "objectives", "weights", "prefer", "predict", "select", "together", "metrics"
+    shown = Table(*columns, title="seconds of a generation")
     for objectives in OBJECTIVES:
         weights, seconds = measured(objectives)
         shown.add_row(str(objectives), str(weights), *(f"{each:.2f}" for each in seconds))
@@ -34,14 +37,17 @@ def main() -> None:
 
 
 def measured(objectives: int) -> tuple[int, tuple[float, ...]]:
-    """How many candidate weights there are, and the seconds of each step and of the first two together."""
+    """How many candidate weights there are, and the seconds of each step and of the first three together."""
     generator = np.random.default_rng(objectives)
     weights = candidate_grid(objectives, SearchConfig().weight_divisions)
     candidates, reference = front(generator, objectives), np.full(objectives, -0.1)
     predicting, predictions = timed(predict, candidates, weights, records(generator, candidates, weights))
     selecting, _ = timed(select_tasks, predictions, candidates, reference, TASKS, 1.0, generator)
     measuring, _ = timed(front_metrics, candidates, reference, weights)
-    return len(weights), (predicting, selecting, predicting + selecting, measuring)
+    preferred = candidates @ generator.dirichlet(np.ones(objectives))
+    choices = [Choice(candidates, int(preferred.argmax()))] * CHOICES
+    preferring, _ = timed(lambda: PreferenceModel(candidates, choices, 0).verdict())
+    return len(weights), (preferring, predicting, selecting, preferring + predicting + selecting, measuring)
 
 
 def front(generator: np.random.Generator, objectives: int) -> np.ndarray:
