@@ -66,6 +66,8 @@ def make_state(make_policy, small_config):
                 records=Records(*generator.normal(size=(3, 4 * generation, 3))),
                 bounds=generator.normal(size=3) if generation else np.full(3, -np.inf),
                 silent_generations=generation,
+                widenings=generation + 1,
+                generations_with_choice=generation + 2,
             ),
             archive=Archive((policies[3], policies[0], policies[-1])),
             units=RunningUnits(*generator.normal(size=(4, 3))),
