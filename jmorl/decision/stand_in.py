@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from jmorl.decision.preferences import Choice, PreferenceModel
+from jmorl.decision.preferences import Choice, PreferenceModel, Verdict
 from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Question
 from jmorl.decision.records import DecisionRecord
 from jmorl.decision.remembered import RunRecord, by_stand_in
@@ -51,10 +51,11 @@ class StandIn(Wrapper):
         if len(question.front) == 1 and self.ask == "unsure":
             return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
         model = PreferenceModel(question.values, self.choices, self.seed)
-        own = self._own_answer(question, model)
-        if own:
-            return question, own
-        asked = self._shortened(question, model) if self.shows == "few" else question
+        verdict = model.verdict()
+        if self._is_sure(question, verdict):
+            reason = f"the answers so far agree on it: expected regret {verdict.regret:.1%} of the range of utility"
+            return question, Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
+        asked = self._shortened(question, model, verdict) if self.shows == "few" else question
         answer: Answer = self.user.respond(asked)
         if answer.policy not in [policy.id for policy in asked.front]:
             asked = asked.whole  # which they wanted to see
@@ -63,18 +64,15 @@ class StandIn(Wrapper):
             self.choices.append(Choice(asked.values, ids.index(answer.policy)))
         return asked, answer
 
-    def _own_answer(self, question: Question, model: PreferenceModel) -> Answer | None:
-        """Return the answer that the user's earlier ones lead to; None where they leave it open."""
-        verdict = model.verdict()
-        if self.ask == "always" or not self.choices or verdict.regret > TRUSTED_REGRET[question.purpose]:
-            return None
-        reason = f"the answers so far agree on it: expected regret {verdict.regret:.1%} of the range of utility"
-        return Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
+    def _is_sure(self, question: Question, verdict: Verdict) -> bool:
+        """Return whether the user's earlier answers leave little doubt."""
+        return self.ask == "unsure" and bool(self.choices) and verdict.regret <= TRUSTED_REGRET[question.purpose]
 
-    def _shortened(self, question: Question, model: PreferenceModel) -> Question:
+    def _shortened(self, question: Question, model: PreferenceModel, verdict: Verdict) -> Question:
+        """Return the question about a few policies; the others may be chosen, too."""
         ids = [policy.id for policy in question.front]
         previous = [ids.index(question.previous)] if question.previous in ids else []
-        rows = model.telling(FEW, [model.verdict().best, *previous])
+        rows = model.telling(FEW, [verdict.best, *previous])
         few = tuple(question.front[row] for row in rows)
         return replace(question, front=few, others=tuple(policy for policy in question.front if policy not in few))
 
