@@ -41,8 +41,8 @@ def measured(objectives: int) -> tuple[int, tuple[float, ...]]:
     generator = np.random.default_rng(objectives)
     weights = candidate_grid(objectives, SearchConfig().weight_divisions)
     candidates, reference = front(generator, objectives), np.full(objectives, -0.1)
-    predicting, predictions = timed(predict, candidates, weights, records(generator, candidates, weights))
-    selecting, _ = timed(select_tasks, predictions, candidates, reference, TASKS, 1.0, generator)
+    predicting, prediction = timed(predict, candidates, weights, records(generator, candidates, weights))
+    selecting, _ = timed(select_tasks, prediction.expected, candidates, reference, TASKS, 1.0, generator)
     measuring, _ = timed(front_metrics, candidates, reference, weights)
     preferred = candidates @ generator.dirichlet(np.ones(objectives))
     choices = [Choice(candidates, int(preferred.argmax()))] * CHOICES
@@ -62,7 +62,7 @@ def records(generator: np.random.Generator, candidates: np.ndarray, weights: np.
     parents = 0.9 * candidates[generator.integers(len(candidates), size=RECORDS)]
     used = weights[generator.integers(len(weights), size=RECORDS)]
     changes = 0.1 * (used - 1 / weights.shape[1]) + generator.normal(0.02, 0.02, size=parents.shape)
-    return Records(parents, used, parents + changes)
+    return Records.empty(weights.shape[1]).add(parents, used, parents + changes)
 
 
 def timed(function: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:

@@ -141,10 +141,11 @@ def selection(candidates: int) -> dict[str, Any]:
     values = np.stack([np.cos(angles), np.sin(angles)], axis=1) * generator.uniform(0.7, 1.0, (candidates, 1))
     weights = simplex_grid(2, 10)
     parents, used = values[generator.integers(candidates, size=66)], weights[generator.integers(11, size=66)]
-    records = Records(parents, used, parents + 0.1 * (used - 0.3) + generator.normal(0, 0.02, parents.shape))
+    children = parents + 0.1 * (used - 0.3) + generator.normal(0, 0.02, parents.shape)
+    records = Records.empty(2).add(parents, used, children)
 
     def select() -> None:
-        predictions = predict(values, weights, records)
+        predictions = predict(values, weights, records).expected
         select_tasks(predictions, values, np.full(2, -0.1), 6, 1.0, np.random.default_rng(0))
 
     return {"candidates": candidates, "seconds": round(_median_seconds(select), 4)}

@@ -51,6 +51,7 @@ BASELINE: Mapping[str, Any] = {
     "search.least_slack": 0.0,
     "search.least_within": 0,
     "search.outside_share": 0.0,
+    "search.optimism": 0.0,
     "search.gain_within": "bounds",
     "search.value_scale": "range",
     "search.sparsity_weight": 1.0,
@@ -62,7 +63,15 @@ BASELINE: Mapping[str, Any] = {
     "reference_point": [],
 }
 ADDED_SINCE_FORMAT_1 = frozenset(
-    {"ask", "question", "population.weights", "search.least_slack", "search.least_within", "search.outside_share"}
+    {
+        "ask",
+        "question",
+        "population.weights",
+        "search.least_slack",
+        "search.least_within",
+        "search.outside_share",
+        "search.optimism",
+    }
 )
 WITHOUT_EFFECT = frozenset({"checkpoints.keep"})  # on results
 

@@ -275,6 +275,7 @@ def _policies(
 ) -> tuple[Policy, ...]:
     """Return agents [P] and their scores as records."""
     predicted = None if tasks is None else tasks.predicted
+    interval = None if tasks is None else tasks.interval
     return tuple(
         Policy(
             id=state.policies + index,
@@ -287,6 +288,7 @@ def _policies(
             # Copied, or each policy would keep those of its whole generation in memory.
             snapshot=jax.tree.map(lambda leaf, index=index: leaf[index].copy(), train_states),
             predicted=None if predicted is None else predicted[index],
+            interval=None if interval is None else interval[:, index],
             raw=None if scores.raw is None else scores.raw[index],
         )
         for index in range(len(weights))

@@ -58,6 +58,7 @@ OTHER = {
     "search.least_slack": 0.02,
     "search.least_within": 6,
     "search.outside_share": 0.5,
+    "search.optimism": 0.5,
     "search.bounds_scale": "one",
     "search.gain_within": "front",
     "search.value_scale": "none",

@@ -9,7 +9,7 @@ Letters: P agents, M objectives, N policies, K predictions.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -47,6 +47,8 @@ class Tasks:
     weights: np.ndarray  # [P, M]
     predicted: np.ndarray | None  # [P, M] expected values of the offspring; None for a method without a model
     candidates: int  # policies that could have been continued
+    interval: np.ndarray | None = None  # [2, P, M] ends between which the values lie in 80 of 100 cases
+    spread: np.ndarray | None = None  # [P, M] standard deviation about the expected values
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +84,14 @@ def checked_tasks(tasks: Any, problem: Problem) -> Tasks:
     weights = _numbers("weights", tasks.weights, (agents, objectives))
     if (weights < 0).any() or not weights.any(axis=1).all():
         raise MethodError("the weights of a task must not be negative, and not all zero")
-    predicted = None if tasks.predicted is None else _numbers("predicted", tasks.predicted, (agents, objectives))
-    return replace(tasks, parents=parents, weights=weights, predicted=predicted)
+    shapes = {"predicted": (agents, objectives), "interval": (2, agents, objectives), "spread": (agents, objectives)}
+    given = {name: getattr(tasks, name) for name in shapes}
+    optional = {name: None if each is None else _numbers(name, each, shapes[name]) for name, each in given.items()}
+    return Tasks(parents, weights, candidates=tasks.candidates, **optional)
 
 
-def _numbers(name: str, given: Any, shape: tuple[int, int]) -> np.ndarray:
-    """Return an array [P, M] of finite numbers. Raise MethodError if it is none."""
+def _numbers(name: str, given: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an array of finite numbers. Raise MethodError if it is none of the shape [P, M], or [2, P, M]."""
     try:
         array = np.asarray(given)
         valid = array.shape == shape and bool(np.isfinite(array).all())

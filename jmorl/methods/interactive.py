@@ -47,6 +47,10 @@ class Interactive(PGMORL):
             np.concatenate([part.weights for part in parts]),
             np.concatenate([part.predicted for part in parts]),
             max(part.candidates for part in parts),
+            *(
+                _joined([getattr(part, name) for part in parts], axis)
+                for name, axis in (("interval", 1), ("spread", 0))
+            ),
         )
 
     def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> PGMORLState:
@@ -90,7 +94,7 @@ class Interactive(PGMORL):
         """Return which bounds a choice would set, what they would rule out, and what is expected within them."""
         search = self._bounded(run, run.search, policy)
         after, bounds = replace(run, search=search, choice=policy), search.bounds
-        expected = self.predictions(after, self.candidates(after)).reshape(-1, len(bounds))
+        expected = self.prediction(after, self.candidates(after)).expected.reshape(-1, len(bounds))
         expected = expected[within(expected, bounds)]
         return Prospect(bounds, within(run.archive.values, bounds), expected[non_dominated(expected)])
 
@@ -113,3 +117,9 @@ class Interactive(PGMORL):
             search.least_within,
         )
         return replace(state, bounds=bounds.lower, widenings=bounds.widenings)
+
+
+def _joined(arrays: Sequence[np.ndarray | None], axis: int) -> np.ndarray | None:
+    """Return the arrays in one; None if one is missing."""
+    known = [array for array in arrays if array is not None]
+    return np.concatenate(known, axis=axis) if len(known) == len(arrays) else None

@@ -14,7 +14,7 @@ from jmorl.search.bounds import members_within
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.metrics import Utility, prediction_metrics, utility_metrics
 from jmorl.search.policy import Policy, values_of
-from jmorl.search.prediction import Records, predict
+from jmorl.search.prediction import Prediction, Records, predict
 from jmorl.search.scaling import REFERENCE_MARGIN, Scale, range_scale, search_scale
 from jmorl.search.selection import select_tasks
 from jmorl.search.weights import candidate_grid
@@ -63,35 +63,42 @@ class PGMORL(Method[PGMORLState]):
             reference = np.full_like(state.bounds, -REFERENCE_MARGIN)
         else:
             reference = np.zeros_like(state.bounds)  # the scale's origin is the reference point
+        prediction = self.prediction(run, continued)
+        hoped = prediction.expected + search.optimism * prediction.spread[:, None]
         tasks = select_tasks(
-            scale.apply(self.predictions(run, continued)),
+            scale.apply(hoped),
             scale.apply(values_of(front)),
             reference,
             count,
             search.sparsity_weight,
             generator,
         )
+        candidates, weights = [task.candidate for task in tasks], [task.weight for task in tasks]
+        expected, spread = prediction.expected[candidates, weights], prediction.spread[candidates]
+        known = len(run.search.records.parents) > 0
+        ends = run.search.records.interval_ends()
         return Tasks(
-            [continued[task.candidate] for task in tasks],
-            self.candidate_weights()[[task.weight for task in tasks]],
-            scale.invert(np.stack([task.predicted for task in tasks])),
+            [continued[candidate] for candidate in candidates],
+            self.candidate_weights()[weights],
+            expected,
             len(continued),
+            expected + ends[:, None] * spread if known else None,
+            spread if known else None,
         )
 
     def candidates(self, run: RunState) -> list[Policy]:
         """Return the policies whose training may be continued, at least one."""
         return list(run.search.buffer.members)
 
-    def predictions(self, run: RunState, policies: Sequence[Policy]) -> np.ndarray:
-        """Predict the values of policies after training with each of the candidate weights, [C, W, M].
+    def prediction(self, run: RunState, policies: Sequence[Policy]) -> Prediction:
+        """Predict the values of policies after training with each of the candidate weights.
 
         The model's constants are for values scaled by range, whatever scale the gains are measured in.
         """
         state = run.search
         scale = search_scale(run.archive.values, state.bounds, reference_point(run), "range")
-        return scale.invert(
-            predict(scale.apply(values_of(policies)), self.candidate_weights(), state.records.scaled(scale))
-        )
+        found = predict(scale.apply(values_of(policies)), self.candidate_weights(), state.records.scaled(scale))
+        return Prediction(scale.invert(found.expected), found.spread * scale.span)
 
     def candidate_weights(self) -> np.ndarray:
         """Return the weights [W, M] that a policy may be trained with after the warm-up."""
@@ -102,7 +109,9 @@ class PGMORL(Method[PGMORLState]):
         state: PGMORLState = run.search
         records = state.records
         if tasks:
-            records = records.add(values_of(tasks.parents), tasks.weights, values_of(offspring))
+            records = records.add(
+                values_of(tasks.parents), tasks.weights, values_of(offspring), _surprises(offspring, tasks)
+            )
         return replace(state, records=records, buffer=state.buffer.offer(offspring, self._scale_of_gains(run)))
 
     def bounds(self, state: PGMORLState) -> np.ndarray:
@@ -137,8 +146,10 @@ class PGMORL(Method[PGMORLState]):
     ) -> PGMORLState:
         """Return the state that was packed."""
         names = [f"records_{each.name}" for each in fields(Records)]
-        packed = names[0] in arrays
-        records = Records(*(arrays[each] for each in names)) if packed else Records.empty(len(arrays["bounds"]))
+        records = Records.empty(len(arrays["bounds"]))
+        if names[0] in arrays:  # an earlier version remembered no surprises
+            nothing = np.full_like(arrays[names[0]], np.nan)
+            records = Records(*(arrays.get(each, nothing) for each in names))
         state = self._state(tuple(policies[each] for each in document["buffer"]), records)
         # Runs of earlier versions have fewer counters, and their bounds never gave way.
         return replace(state, bounds=arrays["bounds"], **{name: document.get(name, 0) for name in COUNTERS})
@@ -152,3 +163,12 @@ class PGMORL(Method[PGMORLState]):
         """Return the scale in which improvements of the front are measured."""
         kind = self.problem.search.value_scale
         return search_scale(run.archive.values, run.search.bounds, reference_point(run), kind)
+
+
+def _surprises(offspring: Sequence[Policy], tasks: Tasks) -> np.ndarray | None:
+    """Return how far the offspring lie from what was expected, in units of the spread [P, M]; None without a spread."""
+    if tasks.predicted is None or tasks.spread is None:
+        return None
+    spread = np.where(tasks.spread > 0, tasks.spread, np.finfo(float).tiny)
+    limit = 1e6  # where nothing has ever changed, any change is a surprise; its size says nothing
+    return np.clip((values_of(offspring) - tasks.predicted) / spread, -limit, limit)

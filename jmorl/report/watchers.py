@@ -111,7 +111,8 @@ class Json(Watcher):
          "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",
          "policy_loss", "value_loss", "entropy", "approximate_kl", "bounds",
          "front_size", "hypervolume", "expected_utility", "sparsity", "below_reference", "utility_max", "utility_mean",
-         "utility_mean_within_bounds", "prediction_error", "realized_change", "widenings" (interactive only),
+         "utility_mean_within_bounds", "prediction_error", "realized_change", "interval_coverage",
+         "widenings" (interactive only),
          "front": [policy, ...]}
         {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
          "bounds": that follow, "shown": how many policies, the fields of the answer ("stop", "generations": before the

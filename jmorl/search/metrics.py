@@ -54,13 +54,24 @@ def prediction_metrics(parents: Sequence[Policy], offspring: Sequence[Policy], s
     """Return how far predictions of a generation's offspring [P] were off, in the archive's scale; None in the warm-up.
 
     `prediction_error` is the mean absolute difference of predicted and realised values, `realized_change` that of
-    parents and children: the error of predicting no change.
+    parents and children: the error of predicting no change. `interval_coverage` is the share of values in their
+    intervals; None without intervals.
     """
     if not parents:
-        return {"prediction_error": None, "realized_change": None}
+        return {"prediction_error": None, "realized_change": None, "interval_coverage": None}
     realized = values_of(offspring)
     predicted = np.stack([child.predicted for child in offspring if child.predicted is not None])
     return {
         "prediction_error": float((np.abs(predicted - realized) / scale.span).mean()),
         "realized_change": float((np.abs(values_of(parents) - realized) / scale.span).mean()),
+        "interval_coverage": coverage(offspring),
     }
+
+
+def coverage(offspring: Sequence[Policy]) -> float | None:
+    """Return the share of the offspring's values that lie in the intervals of their predictions; None without any."""
+    known = [child for child in offspring if child.interval is not None]
+    if not known:
+        return None
+    values, ends = values_of(known), np.stack([child.interval for child in known if child.interval is not None])
+    return float(((ends[:, 0] <= values) & (values <= ends[:, 1])).mean())

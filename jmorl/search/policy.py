@@ -24,6 +24,7 @@ class Policy:
     discounted: np.ndarray  # [M] mean discounted return
     snapshot: Any = field(repr=False)  # parameters, optimiser state and statistics
     predicted: np.ndarray | None = None  # [M] the values the search expected; None in the warm-up
+    interval: np.ndarray | None = None  # [2, M] ends between which the search expected them in 80 of 100 cases
     raw: np.ndarray | None = None  # [M] mean undiscounted return, where `values` are in other units; else None
 
 

@@ -33,6 +33,9 @@ class SearchConfig(Section):
     value_scale: Literal["range", "none"] = Field(
         "range", description="search in values scaled by the archive's range, or in values less the reference point"
     )
+    optimism: NonNegative = Field(
+        0.0, description="tasks by what may come: the expected values and so many times their spread; 0: PGMORL"
+    )
     sparsity_weight: NonNegative = Field(1.0, description="alpha, cost of a sparse front against its hypervolume")
     weight_divisions: Count = Field(
         10, description="steps on each edge of the grid of candidate weights; fewer where it would have over 100"

@@ -3,8 +3,8 @@
 config.toml      every setting, as resolved; `jmorl train --config` takes it
 manifest.json    versions, device, commit, command; the run that it branches off; where it was resumed
 metrics.csv      one row for each generation; 0 is the warm-up; `sigma` only in paper units
-policies.csv     one row for each evaluated policy: origin, weights, scores, what was predicted; `raw` returns only
-                 where the scores are in paper units
+policies.csv     one row for each evaluated policy: origin, weights, scores, what was predicted; `low` to `high` is the
+                 prediction's 80 % interval; `raw` returns only where the scores are in paper units
 front.csv        the rows of the current front
 decisions.jsonl  every question and answer; `--user script=FILE` replays it
 policies/ID.npz  each policy that entered the archive
@@ -198,6 +198,8 @@ class RunFolder:
             **self._named("std", policy.std),
             **self._named("discounted", policy.discounted),
             **self._named("predicted", nothing if policy.predicted is None else policy.predicted),
+            **self._named("low", nothing if policy.interval is None else policy.interval[0]),
+            **self._named("high", nothing if policy.interval is None else policy.interval[1]),
             **self._named("raw", nothing if policy.raw is None else policy.raw),
         }
 

@@ -66,6 +66,7 @@ def pack(state: RunState, method: Method[Any]) -> PackedState:
     arrays = {
         **vectors,
         "predicted": np.stack([nothing if p.predicted is None else p.predicted for p in policies]),
+        "interval": np.stack([np.stack([nothing, nothing]) if p.interval is None else p.interval for p in policies]),
         "reference_point": state.reference_point,
         **_packed_units(state.units, policies),
         **{f"{SEARCH}{name}": array for name, array in search.arrays.items()},
@@ -95,6 +96,7 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
             **{name: arrays[name][row].copy() for name in VECTORS},
             snapshot=snapshots[row],
             predicted=arrays["predicted"][row].copy() if origin["predicted"] else None,
+            interval=_interval(arrays, row),
             raw=arrays["raw"][row].copy() if "raw" in arrays else None,
         )
         for row, origin in enumerate(document["policies"])
@@ -109,6 +111,12 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
         choice=None if choice is None else policies[choice],
         **document["counters"],
     )
+
+
+def _interval(arrays: Mapping[str, np.ndarray], row: int) -> np.ndarray | None:
+    """Return the interval of a policy's prediction; None without one, and in states of versions that had none."""
+    interval = arrays["interval"][row].copy() if "interval" in arrays else None
+    return None if interval is None or np.isnan(interval).any() else interval
 
 
 def from_format_1(packed: PackedState) -> PackedState:

@@ -201,5 +201,6 @@ def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy
         discounted=vector("discounted"),
         snapshot=None,
         predicted=vector_or_none("predicted"),
+        interval=None if vector_or_none("low") is None else np.stack([vector("low"), vector("high")]),
         raw=vector_or_none("raw"),
     )

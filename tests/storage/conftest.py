@@ -45,6 +45,7 @@ def make_policy(small_config, environment):
             parent=None if warm_up else number - 4,
             snapshot=jax.tree.map(draw, shape),
             predicted=None if warm_up else generator.normal(size=3),
+            interval=None if warm_up else generator.normal(size=(2, 3)),
             raw=generator.normal(size=3),
             **vectors,
         )
@@ -63,7 +64,7 @@ def make_state(make_policy, small_config):
         return RunState(
             search=PGMORLState(
                 buffer=PerformanceBuffer(search.buffer_bins, search.buffer_size, tuple(policies[1:])),
-                records=Records(*generator.normal(size=(3, 4 * generation, 3))),
+                records=Records(*generator.normal(size=(4, 4 * generation, 3))),
                 bounds=generator.normal(size=3) if generation else np.full(3, -np.inf),
                 silent_generations=generation,
                 widenings=generation + 1,

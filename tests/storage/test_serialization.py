@@ -90,7 +90,7 @@ def test_a_policy_in_several_places_stays_one(make_state, small_config, environm
 def test_there_are_a_few_arrays_whatever_the_number_of_policies(make_state, method):
     few, many = pack(make_state(1), method), pack(make_state(6), method)
     assert few.arrays.keys() == many.arrays.keys()
-    assert len(many.arrays) < 16
+    assert len(many.arrays) < 18
 
 
 def test_another_network_is_refused_by_name(make_state, small_config, environment, method):
