@@ -24,6 +24,7 @@ from jmorl.report.style import (
     new_figure,
     note,
 )
+from jmorl.search.prediction import COVERAGE
 from jmorl.storage.stored_run import StoredRun
 
 BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
@@ -48,31 +49,40 @@ def progress_figure(run: StoredRun, title: str) -> Figure:
 
 
 def prediction_figure(run: StoredRun, title: str) -> Figure | None:
-    """Predicted against realised change of every offspring, per objective; None for a run without predictions."""
+    """Predicted against realised change of every offspring, per objective; None for a run without predictions.
+
+    A line through each goes from end to end of the prediction's interval.
+    """
     changes = _changes(run)
     if not changes:
         return None
-    generations, predicted, realised = changes
+    generations, predicted, realised, intervals = changes
     last = len(run.bounds) - 1
     colours = [generation_colour(generation, last) for generation in generations]
     figure = new_figure(4.3 * len(run.objectives) + 0.9, 5.3, title)
     grid = list(figure.subplots(1, len(run.objectives), squeeze=False)[0])
-    for axes, objective, *pair in zip(grid, run.objectives, predicted.T, realised.T, strict=True):
-        _draw_prediction(axes, objective, np.stack(pair, axis=1), colours)
+    for index, (axes, objective) in enumerate(zip(grid, run.objectives, strict=True)):
+        pairs = np.stack([predicted[:, index], realised[:, index]], axis=1)
+        _draw_prediction(axes, objective, pairs, intervals[..., index], colours)
     generation_bar(figure, grid, last)
     return figure
 
 
-def _changes(run: StoredRun) -> tuple[list[int], np.ndarray, np.ndarray] | None:
-    """Return generation, predicted and realised change [N, M] of all offspring; None if there are none."""
-    generations, predicted, realised = [], [], []
+def _changes(run: StoredRun) -> tuple[list[int], np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return generation, predicted and realised change [N, M] of all offspring, and intervals [N, 2, M].
+
+    NaN where a prediction has no interval; None if there are no predictions.
+    """
+    generations, predicted, realised, intervals = [], [], [], []
     for policy in run.policies:
         if policy.predicted is not None and policy.parent is not None:
             parent = run.policies[policy.parent]
             generations.append(policy.generation)
             predicted.append(policy.predicted - parent.values)
             realised.append(policy.values - parent.values)
-    return (generations, np.stack(predicted), np.stack(realised)) if generations else None
+            ends = np.full((2, len(policy.values)), np.nan) if policy.interval is None else policy.interval
+            intervals.append(ends - parent.values)
+    return (generations, np.stack(predicted), np.stack(realised), np.stack(intervals)) if generations else None
 
 
 def _draw_utility(axes: Axes, run: StoredRun) -> None:
@@ -127,14 +137,20 @@ def _choice_steps(run: StoredRun) -> list[float]:
     ]
 
 
-def _draw_prediction(axes: Axes, objective: Objective, pairs: np.ndarray, colours: list[Colour]) -> None:
-    """Predicted and realised changes [N, 2] of one objective, and how far the ones are from the others."""
+def _draw_prediction(
+    axes: Axes, objective: Objective, pairs: np.ndarray, intervals: np.ndarray, colours: list[Colour]
+) -> None:
+    """Predicted and realised changes [N, 2] of one objective, intervals [N, 2], and how far off predictions are."""
     low, high = around(np.append(pairs[core(pairs)].ravel(), 0.0)[:, None]).ravel()
     predicted, realised = pairs.T
     axes.plot([low, high], [low, high], color=INK, linewidth=0.9, zorder=1)
     axes.axhline(0, color=PALE, linewidth=0.8, zorder=0.5)
     axes.axvline(0, color=PALE, linewidth=0.8, zorder=0.5)
-    axes.scatter(predicted, realised, s=20, c=colours, linewidths=0.4, edgecolors="white")
+    known = ~np.isnan(intervals).any(axis=1)
+    least, most = intervals[known].T
+    lined = [colour for colour, has in zip(colours, known, strict=True) if has]
+    axes.hlines(realised[known], least, most, color=lined, linewidth=0.8, alpha=0.35, zorder=1.5)
+    axes.scatter(predicted, realised, s=20, c=colours, linewidths=0.4, edgecolors="white", zorder=2)
     axes.set_xlim(low, high)
     axes.set_ylim(low, high)
     axes.set_box_aspect(1)
@@ -142,6 +158,9 @@ def _draw_prediction(axes: Axes, objective: Objective, pairs: np.ndarray, colour
         axis.set_major_locator(MaxNLocator(6))
     error, change = np.abs(predicted - realised).mean(), np.abs(realised).mean()
     text = f"mean error {error:.3g}; of predicting no change {change:.3g}"
+    if known.any():
+        held = ((least <= realised[known]) & (realised[known] <= most)).mean()
+        text += f"\n{held:.0%} realised within the {COVERAGE:.0%} interval (line)"
     axes.set_title(f"{objective.label}\n{text}", fontsize=9.5)
     axes.set_xlabel(f"predicted change of {objective_label(objective)}")
     axes.set_ylabel("realised change")

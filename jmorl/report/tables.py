@@ -15,7 +15,9 @@ from jmorl.display.fronts import front_table, stacked_label
 from jmorl.display.tables import PlainTable
 from jmorl.display.text import REASONS, duration, number_format, objective_label, plural, short_count
 from jmorl.learning.rollout import EpisodeReturns
+from jmorl.search.metrics import coverage
 from jmorl.search.policy import values_of
+from jmorl.search.prediction import COVERAGE
 from jmorl.storage.stored_run import StoredRun
 
 
@@ -43,6 +45,10 @@ def run_heading(run: StoredRun) -> RenderableType:
         "time": f"{duration(seconds)}, {short_count(steps / seconds)} steps/s; answers not counted",
         "state": f"finished: {REASONS[run.result['reason']]}" if run.result else "unfinished",
     }
+    held = coverage(run.policies)
+    if held is not None:
+        known = sum(policy.interval is not None for policy in run.policies)
+        rows["forecasts"] = f"{held:.0%} of what {plural(known, 'policy')} reached lay in its {COVERAGE:.0%} interval"
     grid = Table.grid(padding=(0, 2, 0, 0))
     for name, value in rows.items():
         grid.add_row(Text(name, "bold"), value)

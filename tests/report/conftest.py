@@ -115,6 +115,7 @@ def _policy(generator: np.random.Generator, number: int, generation: int, object
         discounted=0.5 * values,
         snapshot=None,
         predicted=values + generator.normal(0, 0.05, objectives) * scales if generation else None,
+        interval=values + 0.05 * np.outer([-1, 1.5], scales) if generation > 1 else None,
     )
 
 
@@ -140,6 +141,7 @@ def _finished(
             "utility_mean_within_bounds": within_bounds if has_utility else None,
             "prediction_error": 0.02 if state.generation else None,
             "realized_change": 0.08 if state.generation else None,
+            "interval_coverage": 1.0 if state.generation > 1 else None,
         },
         bounds=state.search.bounds,
         generations_to_question=0 if interactive else None,

@@ -178,7 +178,8 @@ def test_predictions_are_compared_with_what_came_of_them(make_run):
         assert prediction_figure(make_run(generations=0), "title") is None
     offspring = [policy for policy in run.policies if policy.generation > 0]
     for index, axes in enumerate(figure.axes[:2]):
-        [points] = axes.collections
+        lines, points = axes.collections
+        assert len(lines.get_segments()) == sum(policy.interval is not None for policy in offspring) > 0
         expected = [
             (
                 policy.predicted[index] - run.policies[policy.parent].values[index],
@@ -189,6 +190,11 @@ def test_predictions_are_compared_with_what_came_of_them(make_run):
         assert np.allclose(points.get_offsets(), expected)
         error = np.mean([abs(predicted - realised) for predicted, realised in expected])
         assert f"mean error {error:.3g};" in axes.get_title(loc="left")
+        known = [policy for policy in offspring if policy.interval is not None]
+        held = np.mean(
+            [ends[0, index] <= policy.values[index] <= ends[1, index] for policy in known for ends in [policy.interval]]
+        )
+        assert f"{held:.0%} realised within the 80% interval" in axes.get_title(loc="left")
         assert axes.get_xlim() == axes.get_ylim()
 
 

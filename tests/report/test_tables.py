@@ -65,6 +65,16 @@ def test_the_heading_sums_the_run_up(make_run):
         assert line in text
 
 
+def test_the_heading_says_how_good_the_forecasts_were(make_run):
+    run = make_run()
+    known = [policy for policy in run.policies if policy.interval is not None]
+    held = np.mean([(policy.interval[0] <= policy.values) & (policy.values <= policy.interval[1]) for policy in known])
+    text = printed(run_tables(run))
+    assert f"forecasts    {held:.0%} of what {len(known)} policies reached lay in its 80% interval" in text
+    warmed_up = make_run(generations=0)
+    assert "forecasts" not in printed(run_tables(warmed_up))
+
+
 def test_a_row_for_every_generation(make_run):
     rows = section(printed(run_tables(make_run())), "Generations")
     assert rows[0] == ["0", "240", "k", "23.5", "k", "4", "0", "-145.99", "-248.46", "10.0"]
