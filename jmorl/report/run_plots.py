@@ -166,4 +166,5 @@ def _draw_prediction(
     axes.set_ylabel("realised change")
     outside = int((~inside(pairs, np.array([[low, low], [high, high]]))).sum())
     if outside:
-        note(axes, f"{outside} of {plural(len(pairs), 'prediction')} outside\n")
+        beside_label = "\n" * (text.count("\n") + 2)
+        note(axes, f"{outside} of {plural(len(pairs), 'prediction')} outside{beside_label}")
