@@ -96,7 +96,7 @@ class Still(Session):
         values = self.view.values
         bounds = values[policy] - 100
         expected = values[policy] + np.random.default_rng(policy).normal(size=(40, values.shape[1])) * 50
-        prospect = Prospect(bounds, (values >= bounds).all(axis=1), expected)
+        prospect = Prospect(bounds, (values >= bounds).all(axis=1), expected, odds=0.25)
         self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: prospect}))
 
     def history(self) -> tuple[()]:

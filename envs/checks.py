@@ -1,5 +1,6 @@
 """Whether an environment is what it says it is, found out before anything is computed with it."""
 
+import math
 from collections.abc import Iterator
 from numbers import Integral
 from typing import Any
@@ -85,8 +86,10 @@ def _wrong_objectives(environment: Environment[Any]) -> Iterator[str]:
     if not all(isinstance(objective, Objective) for objective in objectives):
         yield "objectives are not all of the kind envs.Objective"
         return
-    if not all(isinstance(text, str) for objective in objectives for text in vars(objective).values()):
+    if not all(isinstance(text, str) for each in objectives for text in (each.name, each.label, each.unit)):
         yield "the name, label and unit of an objective are not all texts"
+    if not all(isinstance(each.highest, int | float) and each.highest > -math.inf for each in objectives):
+        yield "the highest return of an objective is not a number"
     if len({objective.name for objective in objectives}) < len(objectives):
         yield "two objectives have the same name"
 

@@ -9,6 +9,7 @@ seen writes a fourth, `scene`, for the host.
 Shape letters: O observation size, A action size, M objectives.
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
@@ -29,12 +30,13 @@ class Objective:
     """One component of the vector reward. Always maximised.
 
     `label` is the quantity and `unit` what an undiscounted return is measured in, as shown on
-    axes and in tables.
+    axes and in tables. No return is above `highest`, so that nothing better is ever promised.
     """
 
     name: str
     label: str
     unit: str
+    highest: float = math.inf
 
 
 class Transition(NamedTuple):

@@ -39,7 +39,7 @@ class HalfCheetah(Environment[BodyState]):
     id = "mo-halfcheetah-v5"
     objectives: ClassVar = (
         Objective("speed", "speed", "m/s·steps"),
-        Objective("energy", "energy", "-control²·steps"),
+        Objective("energy", "energy", "-control²·steps", highest=0.0),
     )
     observation_size = 2 * JOINTS - 1
     action_size = 6

@@ -34,7 +34,10 @@ class MountainCar(Environment[CarState]):
     """A car too weak for the hill. Reward: -1 a step until the flag; minus the squared force."""
 
     id = "mo-mountaincarcontinuous-v0"
-    objectives: ClassVar = (Objective("time", "time", "-steps"), Objective("fuel", "fuel", "-force²·steps"))
+    objectives: ClassVar = (
+        Objective("time", "time", "-steps", highest=0.0),
+        Objective("fuel", "fuel", "-force²·steps", highest=0.0),
+    )
     observation_size = 2
     action_size = 1
     time_limit = 999

@@ -6,6 +6,7 @@ that was scored before it in the same run: the units drift. They are here to com
 Letters: T steps of an episode, M objectives.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -79,4 +80,4 @@ def measured_in(units: str, objectives: Sequence[Objective]) -> tuple[Objective,
     """Return the objectives as scores have them: in "paper" units they have lost those of the environment."""
     if units == "raw":
         return tuple(objectives)
-    return tuple(replace(objective, unit=DRIFTING) for objective in objectives)
+    return tuple(replace(objective, unit=DRIFTING, highest=math.inf) for objective in objectives)

@@ -95,8 +95,10 @@ class Interactive(PGMORL):
         search = self._bounded(run, run.search, policy)
         after, bounds = replace(run, search=search, choice=policy), search.bounds
         expected = self.prediction(after, self.candidates(after)).expected.reshape(-1, len(bounds))
+        expected = np.minimum(expected, [objective.highest for objective in self.problem.objectives])
         expected = expected[within(expected, bounds)]
-        return Prospect(bounds, within(run.archive.values, bounds), expected[non_dominated(expected)])
+        kept = within(run.archive.values, bounds)
+        return Prospect(bounds, kept, expected[non_dominated(expected)], search.records.odds())
 
     def metrics(
         self, run: RunState, utility: Utility, offspring: Sequence[Policy], tasks: Tasks | None

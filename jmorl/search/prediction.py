@@ -52,18 +52,32 @@ class Records:
         """Return the same records in the current scale; weights and surprises have none."""
         return Records(scale.apply(self.parents), self.weights, scale.apply(self.children), self.surprises)
 
+    def odds(self) -> float:
+        """Return how likely a child is at least as good as predicted in every objective: as often as remembered ones.
+
+        While there are few, one in two is assumed in each objective.
+        """
+        known = self._remembered()
+        assumed = float(0.5 ** known.shape[1])
+        share = min(len(known) / ENOUGH, 1.0)
+        return assumed if not len(known) else float(share * (known >= 0).all(axis=1).mean() + (1 - share) * assumed)
+
     def interval_ends(self) -> np.ndarray:
         """Return between which surprises [2, M] the middle `COVERAGE` of those to come lies: as of the remembered ones.
 
         While there are few, they are taken for normally distributed in part.
         """
-        known = self.surprises[~np.isnan(self.surprises).any(axis=1)][-REMEMBERED:]
+        known = self._remembered()
         tails = [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2]
         normal = np.array([[NormalDist().inv_cdf(tail)] * known.shape[1] for tail in tails])
         if not len(known):
             return normal
         share = min(len(known) / ENOUGH, 1.0)
         return share * np.quantile(known, tails, axis=0, method="weibull") + (1 - share) * normal
+
+    def _remembered(self) -> np.ndarray:
+        """Return the last surprises [K, M], without those of tasks that came without a prediction."""
+        return self.surprises[~np.isnan(self.surprises).any(axis=1)][-REMEMBERED:]
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def save_policy(
         "format": FORMAT,
         "jmorl": importlib.metadata.version("jmorl"),
         "environment": config.env,
-        "objectives": [vars(objective) for objective in environment.objectives],
+        "objectives": [{"name": o.name, "label": o.label, "unit": o.unit} for o in environment.objectives],
         "id": policy.id,
         "generation": policy.generation,
         "parent": policy.parent,

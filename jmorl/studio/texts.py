@@ -12,6 +12,7 @@ from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import PERSON, View
 
 POLICIES, PROGRESS, HISTORY, NAVIGATION = "Policies", "Progress", "History", "E-NAUTILUS"  # titles of panels
+MOST_POINTS = 3  # that the prediction model is quoted with
 KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
@@ -136,8 +137,10 @@ def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
     ruled_out = f"Rules out {count} of {plural(len(prospect.kept), 'policy')}: {bounds}."
     if not len(prospect.expected):
         return f"{ruled_out} The model expects nothing new within these bounds."
-    best = minus(values_in_words(prospect.expected.max(axis=0), view.objectives, formats))
-    return f"{ruled_out} The model expects up to {best}."
+    best = dict.fromkeys(prospect.expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
+    points = [minus(values_in_words(prospect.expected[row], view.objectives, formats)) for row in best]
+    odds = f"Training leads at least as far in {10 * prospect.odds:.0f} of 10 cases."
+    return f"{ruled_out} The model expects {'; or '.join(points[:MOST_POINTS])}. {odds}"
 
 
 def minus(text: str) -> str:

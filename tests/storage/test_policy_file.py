@@ -50,7 +50,9 @@ def test_the_header_says_what_the_policy_is(saved, environment, small_config):
     folder, policy = saved
     header = load_policy(folder / "chosen.npz").header
     assert header["environment"] == small_config.env
-    assert header["objectives"] == [vars(objective) for objective in environment.objectives]
+    assert header["objectives"] == [
+        {"name": each.name, "label": each.label, "unit": each.unit} for each in environment.objectives
+    ]
     assert header["values"] == policy.raw.tolist()
     assert (header["score"], header["std"]) == (policy.values.tolist(), policy.std.tolist())
     assert header["weights"] == policy.weights.tolist()
