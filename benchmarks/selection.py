@@ -15,7 +15,7 @@ import numpy as np
 from rich.table import Table
 
 from jmorl.config import SearchConfig
-from jmorl.decision.preferences import Choice, PreferenceModel
+from jmorl.decision.preferences import Comparison, PreferenceModel
 from jmorl.display.console import PlainConsole
 from jmorl.search.metrics import front_metrics
 from jmorl.search.prediction import Records, predict
@@ -45,7 +45,7 @@ def measured(objectives: int) -> tuple[int, tuple[float, ...]]:
     selecting, _ = timed(select_tasks, prediction.expected, candidates, reference, TASKS, 1.0, generator)
     measuring, _ = timed(front_metrics, candidates, reference, weights)
     preferred = candidates @ generator.dirichlet(np.ones(objectives))
-    choices = [Choice(candidates, int(preferred.argmax()))] * CHOICES
+    choices = [Comparison(candidates, (int(preferred.argmax()),))] * CHOICES
     preferring, _ = timed(lambda: PreferenceModel(candidates, choices, 0).verdict())
     return len(weights), (preferring, predicting, selecting, preferring + predicting + selecting, measuring)
 

@@ -85,8 +85,10 @@ class Config(Section):
     ask: Literal["always", "unsure"] = Field(
         "always", description="whom: the user always, or only where their answers so far leave open what they prefer"
     )
-    question: Literal["front", "few"] = Field(
-        "front", description="what is shown: the whole front, or the five policies between which a choice tells most"
+    question: Literal["front", "few", "pair", "rank"] = Field(
+        "front",
+        description="what is asked: the best of the whole front, the best of the few policies between which a choice "
+        "tells most, the better one of a pair, or to rank a few",
     )
     seed: Annotated[int, Field(ge=0, lt=2**32)] = Field(1, description="of all randomness")
     population: PopulationConfig = PopulationConfig()

@@ -5,7 +5,7 @@ the command line, the run folder, a page, reads the same events. What is particu
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
@@ -61,7 +61,7 @@ def run(
     _check_kind("environment", environment, Environment, "as `envs.make` returns it")
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
     _check_kind("decision_maker", decision_maker, DecisionMaker, "an instance of a subclass")
-    if config.ask == "unsure" or config.question == "few":
+    if config.ask == "unsure" or config.question != "front":
         decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
@@ -136,8 +136,7 @@ class _Run:
             yield Resumed(state, self._steps(state), bounds, silent)
         while self._budget_left(state) and not self._satisfied(state):
             while question := self.method.question(state):
-                state, decided = self.ask(state, question)
-                yield decided
+                state, decided = yield from self._decided(state, question)
                 if decided.chosen and question.stops(decided.answer):
                     yield RunFinished(state, decided.chosen, "stopped")
                     return
@@ -147,8 +146,7 @@ class _Run:
         satisfied = self._satisfied(state)
         # What satisfies may lie outside the bounds: the search is not the only one that finds things.
         front = state.archive.members if satisfied else self.method.final_front(state)
-        state, decided = self.ask(state, self._final_question(state, front))
-        yield decided
+        state, decided = yield from self._decided(state, self._final_question(state, front))
         assert decided.chosen is not None
         yield RunFinished(state, decided.chosen, "satisfied" if satisfied else "budget")
 
@@ -178,6 +176,16 @@ class _Run:
         iterations = self.config.population.iterations
         return self._trained(state, train_states, tasks.weights, iterations, tasks, select_seconds)
 
+    def _decided(self, state: RunState, question: AnyQuestion) -> Generator[Decided, None, tuple[RunState, Decided]]:
+        """Put a question to the decision maker, and what may follow from the answer. Yields an event for each."""
+        state, decided = self.ask(state, question)
+        yield decided
+        further = self.decision_maker.follow_up(decided.question, decided.answer)
+        if further:
+            state, decided = self.ask(state, further)
+            yield decided
+        return state, decided
+
     def ask(self, state: RunState, question: AnyQuestion) -> tuple[RunState, Decided]:
         """Put a question to the decision maker. Returns the state with the answer, and the event."""
         started = time.perf_counter()
@@ -199,7 +207,8 @@ class _Run:
     def _final_question(self, state: RunState, front: Sequence[Policy]) -> Question:
         previous = state.choice.id if state.choice else None
         bounds = self.method.bounds(state.search)
-        return Question("final", state.generation + 1, self.method.problem.objectives, tuple(front), bounds, previous)
+        objectives, limits = self.method.problem.objectives, self.method.limits(state.search)
+        return Question("final", state.generation + 1, objectives, tuple(front), bounds, previous, limits=limits)
 
     def _steps(self, state: RunState) -> int:
         """Return the environment steps used for learning so far."""

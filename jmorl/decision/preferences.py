@@ -2,10 +2,12 @@
 
 The posterior is over linear, Chebyshev and aspiration-point utilities of values that are scaled to the front's range.
 An answer is likely under a utility as a softmax of the utilities of what was shown, with a share of answers at random;
-how sharp it is and how large the share are inferred, too (Bradley and Terry 1952; Zintgraf et al. 2018). The posterior
-is a sample: particles from the prior, resampled by likelihood and moved by Metropolis-Hastings.
+how sharp it is and how large the share are inferred, too (Bradley and Terry 1952; Plackett 1975 for rankings; Davidson
+1970 for no difference; Zintgraf et al. 2018). In each generation somebody may have changed their mind, so that what
+they said before counts no more. The posterior is a sample: particles from the prior, resampled by likelihood and moved
+by Metropolis-Hastings.
 
-Letters: S particles, K policies shown, N policies, M objectives.
+Letters: S particles, A answers, K policies shown, N policies, M objectives, B pairs of temperature and random share.
 """
 
 from collections.abc import Sequence
@@ -19,17 +21,20 @@ PARTICLES, DRAWN = 512, 2048  # that are kept, and from which they are resampled
 MOVES, STEP = 16, 0.4  # of Metropolis-Hastings: how many, and their standard deviation
 TEMPERATURES = (0.003, 0.01, 0.03, 0.1)  # of the softmax, in shares of the utility's range over the front
 RANDOM_SHARES = (0.02, 0.25)  # of answers
+CHANGE_OF_MIND = 0.01  # how likely it is in a generation
 AUGMENTATION = 0.05  # weight of the mean in utilities that look at the worst objective
 LINEAR, CHEBYSHEV, ASPIRATION = range(3)
+DRAWS_OF_A_PAIR = 8  # from the posterior, until two differ
 KINDS = (LINEAR, LINEAR, CHEBYSHEV, ASPIRATION)  # in turn, of the particles
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
-    """One answer: which of the vectors that were shown was preferred to all others."""
+class Comparison:
+    """One answer: how the vectors that were shown compare."""
 
     shown: np.ndarray  # [K, M]
-    preferred: int  # index of a row
+    ranking: tuple[int, ...]  # rows from the best down; who is not in it is worse; empty: no difference between all
+    generation: int = 1  # before which it was given
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +47,37 @@ class Verdict:
 
 
 class PreferenceModel:
-    """The posterior after some choices, for judging the members of a front [N, M]."""
+    """The posterior before a generation, after some answers, for judging the members of a front [N, M].
 
-    def __init__(self, front: np.ndarray, choices: Sequence[Choice], seed: int):
+    What does not reach the limits [M] that the decision maker has set is worse than anything that does.
+    """
+
+    def __init__(
+        self,
+        front: np.ndarray,
+        answers: Sequence[Comparison],
+        seed: int,
+        generation: int = 1,
+        limits: np.ndarray | None = None,
+    ):
         self.front = front
         self.scale = range_scale(front)
-        self._kinds, self._parameters = _posterior(self.scale, front, choices, np.random.default_rng(seed))
+        self._limits = np.full(front.shape[1], -np.inf) if limits is None else limits
+        self._generator = np.random.default_rng(seed)
+        self._kinds, self._parameters = _posterior(self.scale, front, answers, generation, self._generator)
 
     def utilities(self, values: np.ndarray) -> np.ndarray:
-        """Return what vectors [N, M] are worth to each particle [S, N]; the front's worst is 0, its best 1."""
+        """Return what vectors [N, M] are worth to each particle [S, N]; the front's worst is 0, its best 1.
+
+        Of those that reach the limits, if there are any; one that does not is worth less than 0.
+        """
         found, of_front = (
             _utilities(self._kinds, self._parameters, self.scale.apply(each)) for each in (values, self.front)
         )
         least, span = _range(of_front)
-        return (found - least[:, None]) / span[:, None]
+        missing = np.maximum(self._limits - values, 0.0) / self.scale.span  # [N, M]
+        far = missing.sum(axis=1)
+        return (found - least[:, None]) / span[:, None] - np.where(far > 0, 1 + far, 0.0)
 
     def verdict(self) -> Verdict:
         """Return which member of the front is best by expectation."""
@@ -78,31 +100,69 @@ class PreferenceModel:
             rows.append(int(gains.argmax()))
         return sorted(rows)
 
+    def sampled_pair(self) -> list[int]:
+        """Return the two rows of the front, of two at least, that two draws from the posterior like best.
+
+        Interactive Thompson sampling (Roijers et al. 2017). Where many draws agree, the second is the one whose
+        comparison with the first tells most.
+        """
+        favourites = self.utilities(self.front).argmax(axis=1)  # [S]
+        drawn = [int(each) for each in self._generator.choice(favourites, size=DRAWS_OF_A_PAIR)]
+        others = [each for each in drawn if each != drawn[0]]
+        return sorted([drawn[0], others[0]]) if others else self.telling(2, drawn[:1])
+
 
 def _posterior(
-    scale: Scale, front: np.ndarray, choices: Sequence[Choice], generator: np.random.Generator
+    scale: Scale,
+    front: np.ndarray,
+    answers: Sequence[Comparison],
+    generation: int,
+    generator: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return kinds [S] and parameters [S, M] of utilities drawn from the posterior."""
     kinds = np.resize(KINDS, DRAWN)
     parameters = _prior(generator, kinds, front.shape[1])
     ends = scale.apply(front)
-    scaled = [(scale.apply(choice.shown), choice.preferred) for choice in choices]
-    likelihood = _log_likelihood(kinds, parameters, scaled, ends)
+    scaled = [(scale.apply(answer.shown), answer.ranking) for answer in answers]
+    likelihoods = _log_likelihoods(kinds, parameters, scaled, ends)  # [A, B, S]
+    changed = _changes_of_mind(generator, generation, len(kinds))  # [S]
+    counts = np.array([answer.generation for answer in answers])[:, None] >= changed  # [A, S]
+    likelihood = _before_changes(likelihoods, counts) + _together(likelihoods, counts)
     weights = np.exp(likelihood - likelihood.max())
     # Systematic resampling (Kitagawa 1996).
     positions = (generator.random() + np.arange(PARTICLES)) / PARTICLES
     drawn = np.searchsorted(np.cumsum(weights) / weights.sum(), positions).clip(max=DRAWN - 1)
-    kinds, parameters = kinds[drawn], parameters[drawn]
-    if not choices:
+    kinds, parameters, counts = kinds[drawn], parameters[drawn], counts[:, drawn]
+    if not answers:
         return kinds, parameters
-    density = likelihood[drawn] + _log_prior(kinds, parameters)
+    density = _together(likelihoods[:, :, drawn], counts) + _log_prior(kinds, parameters)
     for _ in range(MOVES):
         proposed = parameters + STEP * generator.normal(size=parameters.shape) * generator.random((PARTICLES, 1))
-        found = _log_likelihood(kinds, proposed, scaled, ends) + _log_prior(kinds, proposed)
+        found = _together(_log_likelihoods(kinds, proposed, scaled, ends), counts) + _log_prior(kinds, proposed)
         accepted = np.log(generator.random(PARTICLES)) < found - density
         parameters = np.where(accepted[:, None], proposed, parameters)
         density = np.where(accepted, found, density)
     return kinds, parameters
+
+
+def _changes_of_mind(generator: np.random.Generator, generation: int, count: int) -> np.ndarray:
+    """Return for each particle the generation from which answers count [S]: 1 for those that never changed."""
+    ago = generator.geometric(CHANGE_OF_MIND, size=count)  # generations since the last change, 1: just now
+    return np.maximum(generation + 1 - ago, 1)
+
+
+def _before_changes(likelihoods: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Return the likelihood of the answers that do not count [S]: given by somebody of whom only the prior is known."""
+    skipped = (~counts).sum(axis=0)  # [S] the first ones
+    running = np.cumsum(likelihoods, axis=0)  # [A, B, S]
+    marginal = np.array([0.0, *(np.logaddexp.reduce(each, axis=None) - np.log(each.size) for each in running)])
+    return np.asarray(marginal[skipped])
+
+
+def _together(likelihoods: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Return the likelihood of the answers that count [S], averaged over temperatures and shares of random answers."""
+    total = np.einsum("abs,as->bs", likelihoods, counts)
+    return np.asarray(np.logaddexp.reduce(total, axis=0) - np.log(len(total)))
 
 
 def _prior(generator: np.random.Generator, kinds: np.ndarray, objectives: int) -> np.ndarray:
@@ -122,22 +182,28 @@ def _log_prior(kinds: np.ndarray, parameters: np.ndarray) -> np.ndarray:  # [S]
     return density
 
 
-def _log_likelihood(
-    kinds: np.ndarray, parameters: np.ndarray, choices: Sequence[tuple[np.ndarray, int]], ends: np.ndarray
-) -> np.ndarray:  # [S]
-    """Return the likelihood of all choices, averaged over temperatures and shares of random answers."""
-    total = np.zeros((len(TEMPERATURES), len(RANDOM_SHARES), len(kinds)))  # of all pairs of both, [T, R, S]
+def _log_likelihoods(
+    kinds: np.ndarray, parameters: np.ndarray, answers: Sequence[tuple[np.ndarray, tuple[int, ...]]], ends: np.ndarray
+) -> np.ndarray:  # [A, B, S]
+    """Return the likelihood of each answer, for each temperature and share of random answers."""
+    found = np.zeros((len(answers), len(TEMPERATURES), len(RANDOM_SHARES), len(kinds)))
     shares = np.array(RANDOM_SHARES)[:, None]
     _, span = _range(_utilities(kinds, parameters, ends))
-    for shown, preferred in choices:
+    for answer, (shown, ranking) in zip(found, answers, strict=True):
         utilities = _utilities(kinds, parameters, shown)  # [S, K]
         behind = (utilities.max(axis=1, keepdims=True) - utilities) / span[:, None]
         for number, temperature in enumerate(TEMPERATURES):
             odds = np.exp(behind / np.float32(-temperature))
-            probability = odds[:, preferred] / odds.sum(axis=1)
-            total[number] += np.log((1 - shares) * probability + shares / len(shown))
-    pairs = total.reshape(-1, len(kinds))
-    return np.logaddexp.reduce(pairs, axis=0) - np.log(len(pairs))
+            left = np.ones(len(shown), bool)
+            for place in ranking[: len(shown) - 1]:
+                probability = odds[:, place] / np.maximum(odds[:, left].sum(axis=1), np.float32(1e-30))
+                answer[number] += np.log((1 - shares) * probability + shares / left.sum())
+                left[place] = False
+            if not ranking:
+                alike = np.exp(-behind.mean(axis=1) / np.float32(temperature))  # geometric mean of the odds
+                probability = alike / (odds.mean(axis=1) + alike)
+                answer[number] += np.log((1 - shares) * probability + shares / (len(shown) + 1))
+    return found.reshape(len(answers), len(TEMPERATURES) * len(RANDOM_SHARES), len(kinds))
 
 
 def _range(utilities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # [S, N] -> [S], [S]

@@ -3,6 +3,7 @@
 The run imports this; users implement it; neither knows the other.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -16,6 +17,7 @@ from jmorl.decision.enautilus import IntermediatePoint, State
 from jmorl.search.policy import Policy, values_of
 
 Purpose = Literal["steer", "final", "enautilus", "pair"]
+Form = Literal["best", "pair", "rank"]
 
 
 class AnswerError(ValueError):
@@ -79,6 +81,9 @@ class Question(AnyQuestion):
     answer is the run's result. `front` has at least one member; at the end of an interactive run
     it holds those within the bounds. "enautilus": which of the policies that the points of E-NAUTILUS
     head for, see `DecisionMaker.choose_point`; "pair": which of two, see `DecisionMaker.compare`.
+
+    `form` is what is wanted: the "best" of those shown; the better one of a "pair"; or to "rank" those shown from the
+    best down. Whatever the form, the best one is answer enough.
     """
 
     purpose: Purpose
@@ -88,6 +93,9 @@ class Question(AnyQuestion):
     bounds: np.ndarray  # [M] those in force; -inf before the first choice
     previous: int | None  # id of the policy chosen last
     others: tuple[Policy, ...] = ()  # that may be chosen, too, but are shown only if somebody wants to see them
+    form: Form = "best"
+    limits: tuple[float, ...] | None = None  # [M] that somebody has set, -inf where there is none; None: never any
+    again: bool = False  # the second question about one choice, see `DecisionMaker.follow_up`
 
     @property
     def shown(self) -> tuple[Policy, ...]:
@@ -97,7 +105,7 @@ class Question(AnyQuestion):
     @property
     def whole(self) -> "Question":
         """The same question with all policies shown."""
-        return replace(self, front=(*self.front, *self.others), others=())
+        return replace(self, front=(*self.front, *self.others), others=(), form="best")
 
     def policy(self, policy_id: int) -> Policy:
         """Return the policy with this id, shown or not. Raise ValueError if there is none."""
@@ -117,8 +125,12 @@ class Question(AnyQuestion):
             raise AnswerError(f"answer must return a jmorl.Answer(policy id), not {_shortly(answer)}")
         try:
             self.policy(answer.policy)
+            for each in answer.ranking:
+                replace(self, others=()).policy(each)
         except ValueError as error:
             raise AnswerError(str(error)) from None
+        if answer.limits is not None and len(answer.limits) != len(self.objectives):
+            raise AnswerError(f"limits must be {len(self.objectives)} numbers, not {_shortly(answer.limits)}")
         return answer
 
     def to_json(self, answer: Any) -> dict[str, Any]:
@@ -146,7 +158,9 @@ class Question(AnyQuestion):
 class Answer:
     """The preferred policy, by id, and what the run shall do next.
 
-    NumPy's and other whole numbers become Python's, and a `Policy` its id. Raises AnswerError for anything else.
+    Who likes none of those shown better than the policy chosen last answers with that one. Limits hold until others
+    are set. NumPy's and other whole numbers become Python's, and a `Policy` its id. Raises AnswerError for anything
+    else.
     """
 
     policy: int
@@ -154,14 +168,25 @@ class Answer:
     generations: int = 1  # how many generations to go on before the next question, at least 1
     stand_in: bool = False  # a stand-in answered, and nobody was asked (`jmorl.decision.stand_in`)
     reason: str = field(default="", compare=False)  # why a stand-in did
+    ranking: tuple[int, ...] = ()  # of those shown, from the best down; who is not in it is worse than who is
+    equal: bool = False  # no difference between those shown; `policy` is any of them, or the one chosen last
+    limits: tuple[float, ...] | None = None  # [M] what each objective must reach, -inf: anything; None: as before
 
     def __post_init__(self) -> None:
-        policy = self.policy.id if isinstance(self.policy, Policy) else _whole("policy", self.policy, 0)
-        object.__setattr__(self, "policy", policy)
-        object.__setattr__(self, "generations", _whole("generations", self.generations, 1))
-        if not isinstance(self.stop, (bool, np.bool_)):
-            raise AnswerError(f"stop must be True or False, not {_shortly(self.stop)}")
-        object.__setattr__(self, "stop", bool(self.stop))
+        ranking = tuple(_id("ranking", each) for each in self.ranking)
+        if len(set(ranking)) < len(ranking):
+            raise AnswerError(f"a policy is twice in the ranking {list(ranking)}")
+        if ranking and self.equal:
+            raise AnswerError("policies between which there is no difference cannot be ranked")
+        for name, value in (
+            ("policy", _id("policy", self.policy)),
+            ("generations", _whole("generations", self.generations, 1)),
+            ("stop", _truth("stop", self.stop)),
+            ("equal", _truth("equal", self.equal)),
+            ("ranking", ranking),
+            ("limits", None if self.limits is None else tuple(_limit(each) for each in self.limits)),
+        ):
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)
@@ -324,6 +349,10 @@ class DecisionMaker(ABC):
         """Return the question as it was asked, and the answer: a stand-in may ask about fewer policies."""
         return question, self.respond(question)
 
+    def follow_up(self, question: AnyQuestion, answer: Any) -> AnyQuestion | None:
+        """Return a further question about an answer just given, which then takes its place; None if there is none."""
+        return None
+
     def compare(self, question: PairQuestion) -> int | None:
         """Return the id of the preferred one of two policies, or None for no difference; here: as `answer` has it."""
         unbounded = np.full(len(question.objectives), -np.inf)
@@ -356,6 +385,29 @@ class DecisionMaker(ABC):
     def satisfied(self, values: np.ndarray) -> bool:
         """Return whether a run with the front `values` [N, M] may stop early."""
         return False
+
+
+def _id(name: str, value: Any) -> int:
+    """Return the id that a policy has, or that a value is. Raise AnswerError."""
+    return value.id if isinstance(value, Policy) else _whole(name, value, 0)
+
+
+def _truth(name: str, value: Any) -> bool:
+    """Return a truth value as Python's `bool`. Raise AnswerError if it is none."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise AnswerError(f"{name} must be True or False, not {_shortly(value)}")
+    return bool(value)
+
+
+def _limit(value: Any) -> float:
+    """Return a limit as Python's `float`; None is no limit. Raise AnswerError if it is no number."""
+    try:
+        number = -math.inf if value is None else float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if math.isnan(number) or number == math.inf:
+        raise AnswerError(f"a limit must be a number, or -inf for none, not {_shortly(value)}")
+    return number
 
 
 def _whole(name: str, value: Any, least: int) -> int:

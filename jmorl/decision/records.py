@@ -12,7 +12,10 @@ An answer of E-NAUTILUS, where `shown` has the policies that the points head for
 with the answers {"point": index}, {"steps": back} and {"iterations_left": h, "points": n}. `stop`, `generations` and
 the `shown` of a decision may be left out of a log written by hand.
 
-A decision that a stand-in took has `"stand_in": true`, and format 3.
+A decision that a stand-in took has `"stand_in": true`, and format 3. One with more than a preferred policy has format
+4, and what there is of `"ranking": [17, 4, 9]`, those shown from the best down; `"equal": true`, no difference between
+those shown; `"limits": [null, -45.0]`, what each objective must reach from then on, null where anything will do; and
+`"again": true` for the second question about one choice. The run went on with `policy`.
 
 An answer to a question of any other kind, where `answer` is as that kind writes it:
 
@@ -20,6 +23,7 @@ An answer to a question of any other kind, where `answer` is as that kind writes
 """
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,7 +34,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, TypeAdapter, Validat
 from jmorl.decision.protocol import Answer, AnyQuestion, Choose, PointAnswer, PointQuestion, Question
 from jmorl.search.policy import Policy
 
-FORMAT = 3  # the newest of any record
+FORMAT = 4  # the newest of any record
 OTHER_KIND_FORMAT = 2
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -65,7 +69,24 @@ class DecisionRecord:
     generations: Annotated[int, Field(ge=1)] = 1
     shown: tuple[Shown, ...] = ()
     stand_in: bool = False
-    format: Literal[1, 3] = 1
+    ranking: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    equal: bool = False
+    limits: tuple[Finite | None, ...] | None = None  # [M]
+    again: bool = False
+    format: Literal[1, 3, 4] = 1
+
+    @property
+    def answer(self) -> Answer:
+        """The answer that was given."""
+        return Answer(
+            self.policy,
+            self.stop,
+            self.generations,
+            self.stand_in,
+            ranking=self.ranking,
+            equal=self.equal,
+            limits=tuple(-math.inf if limit is None else limit for limit in self.limits) if self.limits else None,
+        )
 
 
 @dataclass(frozen=True)
@@ -140,7 +161,11 @@ def decision_record(question: Question, answer: Answer) -> DecisionRecord:
         answer.generations,
         _shown(question.front),
         answer.stand_in,
-        3 if answer.stand_in else 1,
+        answer.ranking,
+        answer.equal,
+        answer.limits and tuple(limit if math.isfinite(limit) else None for limit in answer.limits),
+        question.again,
+        4 if answer.ranking or answer.equal or answer.limits or question.again else 3 if answer.stand_in else 1,
     )
 
 
@@ -152,8 +177,8 @@ def point_record(question: PointQuestion, answer: PointAnswer) -> PointRecord:
 def to_json(record: Record) -> str:
     """Return the record as one line, without a line break."""
     fields = {"format": record.format, **asdict(record)}
-    if fields.get("stand_in") is False:
-        del fields["stand_in"]  # as in format 1, which did not have it
+    later = {"stand_in": False, "ranking": (), "equal": False, "limits": None, "again": False}  # than format 1
+    fields = {name: value for name, value in fields.items() if name not in later or value != later[name]}
     return json.dumps(fields, allow_nan=False)
 
 

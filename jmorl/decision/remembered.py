@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Question
+from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
 from jmorl.decision.records import AnswerRecord, DecisionRecord
 from jmorl.decision.wrapper import Wrapper
 
@@ -60,5 +60,5 @@ def by_stand_in(record: RunRecord) -> bool:
 def answer_in(record: RunRecord, question: AnyQuestion) -> Any:
     """Return the answer that a record of the question holds."""
     if isinstance(record, DecisionRecord):
-        return Answer(record.policy, record.stop, record.generations, record.stand_in)
+        return record.answer
     return question.from_json(record.answer)

@@ -1,6 +1,7 @@
 """A user who decides as a decision log says: the same run again, or a run that somebody prepared."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -54,9 +55,11 @@ class ScriptedUser(DecisionMaker):
 
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
-        place = question.generation, 0
-        steering = self._steering.get(place) if question.purpose == "steer" else None
-        record = steering or self._final.get(place)
+        generation, again = question.generation, int(question.again)
+        logs = (self._steering, self._final) if question.purpose == "steer" else (self._final,)
+        found = [log[place] for place in ((generation, again), (generation, 0)) for log in logs if place in log]
+        record = found[0] if found else None
+        steering = record is not None and record.purpose == "steer"
         if record is None:
             generations = sorted(generation for generation, _ in self._steering | self._final)
             raise ScriptError(
@@ -65,8 +68,8 @@ class ScriptedUser(DecisionMaker):
             )
         policies = question.whole.front
         index = self._find(record.policy, record.values, policies, question.generation)
-        stop = record.stop or (question.purpose == "steer" and steering is None)
-        return Answer(policies[index].id, stop, record.generations, record.stand_in)
+        stop = record.stop or (question.purpose == "steer" and not steering)
+        return replace(record.answer, policy=policies[index].id, stop=stop, ranking=self._ranked(record, policies))
 
     def choose_point(self, question: PointQuestion) -> PointAnswer:
         """Return the answer to a question of E-NAUTILUS."""
@@ -80,6 +83,12 @@ class ScriptedUser(DecisionMaker):
             return record.answer
         chosen = record.shown[record.answer.point]
         return Choose(self._find(chosen.policy, chosen.values, question.representatives, question.generation))
+
+    def _ranked(self, record: DecisionRecord, policies: tuple[Policy, ...]) -> tuple[int, ...]:
+        """Return the record's ranking, by the ids that the policies have here."""
+        values = {shown.policy: shown.values for shown in record.shown}
+        found = [self._find(each, values[each], policies, record.generation) for each in record.ranking]
+        return tuple(policies[index].id for index in found)
 
     def _find(self, policy: int, values: tuple[float, ...], shown: tuple[Policy, ...], generation: int) -> int:
         """Return the index of the shown policy with these values; if there are several, rather the one with this id.
@@ -104,7 +113,7 @@ def _timeline(records: Iterable[R]) -> dict[tuple[int, int], R]:
     """Return the records by generation and number, without those that a later line goes back behind."""
     kept: dict[tuple[int, int], R] = {}
     for record in records:
-        place = record.generation, record.number if isinstance(record, PointRecord) else 0
+        place = record.generation, record.number if isinstance(record, PointRecord) else int(record.again)
         kept = {earlier: each for earlier, each in kept.items() if earlier < place}
         kept[place] = record
     return kept

@@ -1,20 +1,26 @@
 """A stand-in: it answers where a decision maker's answers leave little doubt, and shortens what it asks them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
-from jmorl.decision.preferences import Choice, PreferenceModel, Verdict
-from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Question
-from jmorl.decision.records import DecisionRecord
+from jmorl.decision.preferences import Comparison, PreferenceModel, Verdict
+from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Form, Question
+from jmorl.decision.records import DecisionRecord, decision_record
 from jmorl.decision.remembered import RunRecord, by_stand_in
 from jmorl.decision.wrapper import Wrapper
+from jmorl.search.policy import Policy
+
+Ask = Literal["always", "unsure"]
+Shows = Literal["front", "few", "pair", "rank"]
+FORMS: dict[Shows, Form] = {"front": "best", "few": "best", "pair": "pair", "rank": "rank"}
 
 # The expected regret up to which the stand-in answers, in shares of the utility's range over the front. A choice that
 # steers can be corrected in the next generation, the last one cannot.
 TRUSTED_REGRET = {"steer": 0.02, "final": 0.01}
+DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
 FEW = 5  # policies in a short question
 
 
@@ -23,8 +29,9 @@ class StandIn(Wrapper):
 
     It is sure where its expected regret is small (`TRUSTED_REGRET`); with `ask` "always" it never is. With `shows`
     "few" it asks about few policies at a time: the best by expectation, the one that was chosen last, and those whose
-    comparison tells most. `history` has the records of a run that goes on; only what the user said themselves counts.
-    The same answers give the same posterior.
+    comparison tells most; with "rank" for their order; with "pair" about two, after which it goes on with the best by
+    expectation. `history` has the records of a run that goes on; only what the user said themselves counts. The same
+    answers give the same posterior.
     """
 
     def __init__(
@@ -32,12 +39,14 @@ class StandIn(Wrapper):
         user: DecisionMaker,
         seed: int,
         history: Iterable[RunRecord] = (),
-        ask: Literal["always", "unsure"] = "unsure",
-        shows: Literal["front", "few"] = "front",
+        ask: Ask = "unsure",
+        shows: Shows = "front",
     ):
         super().__init__(user)
         self.seed = seed
-        self.choices = [choice for choice in map(_recorded, history) if choice]
+        own = [each for each in history if isinstance(each, DecisionRecord) and not by_stand_in(each)]
+        self.answers = [answer for answer in map(_said, own) if answer]
+        self.limits = next((each.answer.limits for each in reversed(own) if each.limits), None)
         self.ask = ask
         self.shows = shows
 
@@ -48,42 +57,93 @@ class StandIn(Wrapper):
         """
         if not isinstance(question, Question) or question.purpose not in TRUSTED_REGRET:
             return question, self.user.respond(question)
+        if question.again:
+            return self._asked(question)
         if len(question.front) == 1 and self.ask == "unsure":
             return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
-        model = PreferenceModel(question.values, self.choices, self.seed)
+        model = self._model(question)
         verdict = model.verdict()
         if self._is_sure(question, verdict):
             reason = f"the answers so far agree on it: expected regret {verdict.regret:.1%} of the range of utility"
             return question, Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
-        asked = self._shortened(question, model, verdict) if self.shows == "few" else question
+        return self._asked(self._shortened(question, model, verdict))
+
+    def _asked(self, asked: Question) -> tuple[Question, Answer]:
+        """Ask the user, and take note of what they say. Return the question as they saw it, and the answer."""
         answer: Answer = self.user.respond(asked)
-        if answer.policy not in [policy.id for policy in asked.front]:
+        if asked.form == "best" and not answer.equal and not _is_shown(asked, answer.policy):
             asked = asked.whole  # which they wanted to see
-        ids = [policy.id for policy in asked.front]
-        if len(ids) > 1:
-            self.choices.append(Choice(asked.values, ids.index(answer.policy)))
+        if asked.form == "pair" and not answer.ranking and not answer.equal and _is_shown(asked, answer.policy):
+            answer = replace(answer, ranking=(answer.policy,))
+        self.limits = answer.limits or self.limits
+        said = _said(decision_record(asked, asked.checked(answer)))
+        self.answers += [said] if said else []
+        if answer.equal or (asked.form == "pair" and answer.ranking and not answer.stop):
+            whole = asked.whole
+            answer = replace(answer, policy=whole.front[self._model(whole).verdict().best].id)
         return asked, answer
+
+    def follow_up(self, question: AnyQuestion, answer: Any) -> Question | None:
+        """Return the question whether an answer was meant so, where the user's other answers speak for another policy.
+
+        Whoever says so twice is believed.
+        """
+        if not isinstance(question, Question) or not question.was_asked(answer) or question.again or answer.stop:
+            return None
+        if question.purpose not in TRUSTED_REGRET or question.form != "best" or self.ask != "unsure":
+            return None
+        whole = question.whole
+        model = self._model(whole)
+        expected = model.utilities(whole.values).mean(axis=0)  # [N]
+        ids = [policy.id for policy in whole.front]
+        best, chosen = int(expected.argmax()), ids.index(answer.policy)
+        if expected[best] - expected[chosen] < DOUBTED_REGRET:
+            return None
+        pair = whole.front[best], whole.front[chosen]
+        return replace(whole, front=pair, others=_without(whole.front, pair), again=True)
+
+    def _model(self, question: Question) -> PreferenceModel:
+        """Return the posterior by now."""
+        limits = None if self.limits is None else np.array(self.limits)
+        return PreferenceModel(question.values, self.answers, self.seed, question.generation, limits)
 
     def _is_sure(self, question: Question, verdict: Verdict) -> bool:
         """Return whether the user's earlier answers leave little doubt."""
-        return self.ask == "unsure" and bool(self.choices) and verdict.regret <= TRUSTED_REGRET[question.purpose]
+        return self.ask == "unsure" and bool(self.answers) and verdict.regret <= TRUSTED_REGRET[question.purpose]
 
     def _shortened(self, question: Question, model: PreferenceModel, verdict: Verdict) -> Question:
-        """Return the question about a few policies; the others may be chosen, too."""
-        ids = [policy.id for policy in question.front]
-        previous = [ids.index(question.previous)] if question.previous in ids else []
-        rows = model.telling(FEW, [verdict.best, *previous])
+        """Return the question in the form wanted, about a few policies; the others may be chosen, too."""
+        if self.shows == "front" or len(question.front) == 1:
+            return question
+        if self.shows == "pair":
+            rows = model.sampled_pair()
+        else:
+            ids = [policy.id for policy in question.front]
+            previous = [ids.index(question.previous)] if question.previous in ids else []
+            rows = model.telling(FEW, [verdict.best, *previous])
         few = tuple(question.front[row] for row in rows)
-        return replace(question, front=few, others=tuple(policy for policy in question.front if policy not in few))
+        return replace(question, front=few, others=_without(question.front, few), form=FORMS[self.shows])
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""
         return self.decide(question)[1]
 
 
-def _recorded(record: RunRecord) -> Choice | None:
-    """Return the choice in a record; None if the user did not make it, or had none."""
-    if not isinstance(record, DecisionRecord) or by_stand_in(record) or len(record.shown) < 2:
+def _without(policies: Sequence[Policy], some: Sequence[Policy]) -> tuple[Policy, ...]:
+    return tuple(policy for policy in policies if policy not in some)
+
+
+def _is_shown(question: Question, policy: int) -> bool:
+    return policy in [each.id for each in question.front]
+
+
+def _said(record: DecisionRecord) -> Comparison | None:
+    """Return what a record says of the policies that were shown; None if there was no other policy."""
+    shown = {each.policy: each.values for each in record.shown}
+    ranking = () if record.equal else record.ranking or (record.policy,)
+    if not record.equal and not record.ranking:
+        shown.setdefault(record.policy, record.values)  # they like none of those shown better
+    if len(shown) < 2:
         return None
-    ids = [shown.policy for shown in record.shown]
-    return Choice(np.array([shown.values for shown in record.shown]), ids.index(record.policy))
+    rows = list(shown)
+    return Comparison(np.array(list(shown.values())), tuple(map(rows.index, ranking)), record.generation)

@@ -1,6 +1,8 @@
 """A person at a terminal, asked in text. Works with piped input, too."""
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from envs.core import Objective
 from jmorl.decision.protocol import (
@@ -19,7 +21,10 @@ from jmorl.display.console import PlainConsole
 LONGEST_NUMBER = 9  # digits
 POLICY_HELP = """\
   12           choose policy 12
-  Enter        keep your last choice
+  Enter        keep your last choice: none of these is better
+  12 4 9       prefer policy 12, then 4, then 9, to all others
+  same         no difference between these
+  {limit:<12} from now on, rule out what does not reach this; none instead of a number: anything will do
   {more:<12} list the policies with the most of an objective first
   all          list every policy, where only some are shown; the others can be chosen, too
   12 go 5      choose policy 12, then no question for 5 generations (or go 5)
@@ -48,6 +53,7 @@ class TerminalUser(DecisionMaker):
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
         show_front(self.console, question, by=0)
+        limits = question.limits
         while True:
             line = self._line("policy (? for help) > ")
             if line and line.strip().lower() == "all":
@@ -57,7 +63,10 @@ class TerminalUser(DecisionMaker):
             reply = policy_reply(question, "q" if line is None else line)
             match reply:
                 case Answer():
-                    return reply
+                    return replace(reply, limits=None if question.limits == limits else question.limits)
+                case tuple():
+                    question = replace(question, limits=reply)
+                    show_front(self.console, question, by=0)
                 case int():
                     show_front(self.console, question, by=reply)
                 case str() if line is None:
@@ -89,24 +98,37 @@ class TerminalUser(DecisionMaker):
         self.console.print(sentence)
 
 
-def policy_reply(question: Question, line: str) -> Answer | int | str:
-    """Return what a line means: an answer, an objective's index to list by, or a sentence to say and ask again."""
+def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, ...] | str:
+    """Return what a line means: an answer, an objective's index to list by, limits, or a sentence to say and ask again.
+
+    Limits [M] are those from now on, -inf where there is none.
+    """
     words = line.lower().split()
+    name = question.objectives[-1].name
     if words[:1] in (["?"], ["help"]):
-        return POLICY_HELP.format(more=f"more {question.objectives[-1].name}")
+        return POLICY_HELP.format(more=f"more {name}", limit=f"limit {name} 5")
     if words[:1] == ["more"]:
         return _objective(question.objectives, " ".join(words[1:]))
+    if words[:1] == ["limit"]:
+        return _limits(question, words[1:])
+    if words == ["same"]:
+        kept = question.previous in [policy.id for policy in question.whole.front]
+        return Answer(question.previous if kept and question.previous is not None else question.front[0].id, equal=True)
+    ranking = _ranking(question, words)
+    if isinstance(ranking, str):
+        return ranking
     named = words.pop(0) if words and words[0] not in ("go", "q") else None
     chosen = _policy(question, named)
     if isinstance(chosen, str):
         return chosen
+    del words[: max(len(ranking) - 1, 0)]
     match words:
         case []:
-            return Answer(chosen)
+            return Answer(chosen, ranking=ranking)
         case ["q"]:
-            return Answer(chosen, stop=True)
+            return Answer(chosen, stop=True, ranking=ranking)
         case ["go", number] if question.purpose == "steer" and (generations := _number(number)):
-            return Answer(chosen, generations=generations)
+            return Answer(chosen, generations=generations, ranking=ranking)
         case ["go", *_] if question.purpose == "steer":
             return "Say for how many generations to go on, for example: go 5"
         case ["go", *_]:
@@ -157,6 +179,43 @@ def _policy(question: Question, named: str | None) -> int | str:
     if number not in ids:
         return f"There is no policy {number} in this front; it has {', '.join(map(str, sorted(ids)))}."
     return number
+
+
+def _ranking(question: Question, words: list[str]) -> tuple[int, ...] | str:
+    """Return the ids of a line that begins with several; a sentence if one is twice, or not shown; else nothing."""
+    ids = []
+    for word in words:
+        number = _number(word)
+        if number is None:
+            break
+        ids.append(number)
+    if len(ids) < 2:
+        return ()
+    shown = [policy.id for policy in question.front]
+    if len(set(ids)) < len(ids):
+        return "Name each policy once, from the best down."
+    strange = [str(each) for each in ids if each not in shown]
+    if strange:
+        return f"Only the policies shown can be put in order, and {', '.join(strange)} is not among them."
+    return tuple(ids)
+
+
+def _limits(question: Question, words: list[str]) -> tuple[float, ...] | str:
+    """Return all limits, with one objective's changed; a sentence if the words do not say how."""
+    *named, value = words or [""]
+    index = _objective(question.objectives, " ".join(named)) if named else ""
+    if isinstance(index, str):
+        name = question.objectives[-1].name
+        return f"Name an objective and what it must reach, for example: limit {name} 5; or: limit {name} none"
+    try:
+        limit = -math.inf if value == "none" else float(value)
+    except ValueError:
+        limit = math.nan
+    if math.isnan(limit) or limit == math.inf:
+        return f"A limit is a number, or none; {value!r} is neither."
+    limits = list(question.limits or [-math.inf] * len(question.objectives))
+    limits[index] = limit
+    return tuple(limits)
 
 
 def _objective(objectives: tuple[Objective, ...], named: str) -> int | str:

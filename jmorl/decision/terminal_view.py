@@ -16,9 +16,14 @@ PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
 def show_front(console: PlainConsole, question: Question, by: int) -> None:
     """Show the question, its front with the most of objective `by` first, and a plot of it."""
-    heading = front_question(question.purpose, question.generation, len(question.front))
+    heading = front_question(question.purpose, question.generation, len(question.front), question.form, question.again)
     table = front_table(
-        question.front, question.objectives, previous_id=question.previous, by=by, bounds=question.bounds
+        question.front,
+        question.objectives,
+        previous_id=question.previous,
+        by=by,
+        bounds=question.bounds,
+        limits=question.limits,
     )
     if question.others:
         heading += f" (all lists {plural(len(question.others), 'other')}.)"

@@ -54,7 +54,9 @@ class UtilityUser(DecisionMaker):
 
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
-        return Answer(question.front[int(np.argmax(self.scalarise(question.values)))].id)
+        order = np.argsort(-self.scalarise(question.values), kind="stable")
+        ids = [question.front[row].id for row in order]
+        return Answer(ids[0], ranking=tuple(ids) if question.form == "rank" else ())
 
     def utility(self, values: np.ndarray) -> np.ndarray | None:
         """Return the utilities [N] of objective vectors [N, M]; None without a utility."""

@@ -25,16 +25,18 @@ def front_table(
     previous_id: int | None = None,
     by: int = 0,
     bounds: np.ndarray | None = None,
+    limits: Sequence[float] | None = None,
 ) -> PlainTable:
     """One row for each of at least one policy, the most of objective `by` first.
 
     Values are in raw units, with their standard deviation over the evaluation episodes; weights are those the
     policy was trained with, and gen the generation it was born in, 0 being the warm-up. What lies outside the
-    bounds [M] is dimmed.
+    bounds [M], or does not reach the limits [M] that somebody has set, is dimmed.
     """
     values = values_of(list(policies))
     stds = np.stack([policy.std for policy in policies])
     bounded = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
+    good = np.ones(len(policies), bool) if limits is None else within(values, np.array(limits))
     scores = [_scores(*column) for column in zip(values.T, stds.T, strict=True)]
     table = PlainTable("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
@@ -45,8 +47,8 @@ def front_table(
             *(column[index] for column in scores),
             " ".join(f"{weight:.2g}" for weight in policy.weights),
             str(policy.generation),
-            notes.get(True, "" if bounded[index] else "outside the bounds"),
-            style="bold" if policy.id == chosen_id else None if bounded[index] else "dim",
+            notes.get(True, "" if bounded[index] else "outside the bounds") if good[index] else "beyond your limits",
+            style="bold" if policy.id == chosen_id else None if bounded[index] and good[index] else "dim",
         )
     return table
 

@@ -155,6 +155,10 @@ class Method(ABC, Generic[SearchState]):
         """Return the lower bounds [M] of the part of objective space in which is searched; -inf without a bound."""
         return np.full(len(self.problem.objectives), -np.inf)
 
+    def limits(self, state: SearchState) -> tuple[float, ...] | None:
+        """Return what each objective must reach [M] by the decision maker's word, -inf: anything; None: never said."""
+        return None
+
     def generations_to_question(self, state: SearchState) -> int | None:
         """Return how many generations end before the next question; None for a method that never asks."""
         return None

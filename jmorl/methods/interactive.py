@@ -27,7 +27,9 @@ class Interactive(PGMORL):
             return None
         previous = run.choice.id if run.choice else None
         generation, objectives = run.generation + 1, self.problem.objectives
-        return Question("steer", generation, objectives, run.archive.members, run.search.bounds, previous)
+        search = run.search
+        members = run.archive.members
+        return Question("steer", generation, objectives, members, search.bounds, previous, limits=search.limits)
 
     def tasks(self, run: RunState) -> Tasks:
         """Return tasks within the bounds; while the same policy stays preferred, some of them anywhere."""
@@ -56,7 +58,8 @@ class Interactive(PGMORL):
     def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> PGMORLState:
         """Return the state with the bounds that follow from the choice."""
         assert run.choice is not None and isinstance(question, Question), "the question is about policies"
-        state = replace(run.search, silent_generations=answer.generations)
+        limits = answer.limits or run.search.limits
+        state = replace(run.search, silent_generations=answer.generations, limits=limits)
         if run.choice.id != question.previous:
             state = replace(state, generations_with_choice=0)
         return self._bounded(run, state, run.choice)
@@ -83,8 +86,15 @@ class Interactive(PGMORL):
         return self._bounded(run, state, run.choice) if self.problem.search.least_within else state
 
     def final_front(self, run: RunState) -> Sequence[Policy]:
-        """Return the members of the archive within the bounds."""
-        return members_within(run.archive.members, run.search.bounds)
+        """Return the members of the archive within the bounds; if some reach the limits, no others."""
+        inside = members_within(run.archive.members, run.search.bounds)
+        if run.search.limits is None:
+            return inside
+        return members_within(inside, np.array(run.search.limits)) or inside
+
+    def limits(self, state: PGMORLState) -> tuple[float, ...] | None:
+        """Return the limits that were set."""
+        return state.limits
 
     def generations_to_question(self, state: PGMORLState) -> int:
         """Return how many generations end before the next question."""
@@ -107,7 +117,10 @@ class Interactive(PGMORL):
         return {**super().metrics(run, utility, offspring, tasks), "widenings": run.search.widenings}
 
     def _bounded(self, run: RunState, state: PGMORLState, chosen: Policy) -> PGMORLState:
-        """Return the state with the bounds that follow from a choice (the paper's equation 4), widened if need be."""
+        """Return the state with the bounds that follow from a choice (the paper's equation 4), widened if need be.
+
+        Where the choice reaches a limit, the bounds widen no farther than that, less their slack at first.
+        """
         values, search = run.archive.values, self.problem.search
         spans = np.ptp(values, axis=0)
         bounds = widened_bounds(
@@ -117,6 +130,7 @@ class Interactive(PGMORL):
             search.least_slack * spans,
             values_of(state.buffer.members),
             search.least_within,
+            state.limits,
         )
         return replace(state, bounds=bounds.lower, widenings=bounds.widenings)
 

@@ -34,6 +34,7 @@ class PGMORLState:
     silent_generations: int = 0  # to go before the next question
     widenings: int = 0  # of the bounds
     generations_with_choice: int = 0  # trained since another policy was chosen
+    limits: tuple[float, ...] | None = None  # [M] that the decision maker has set, -inf where none; None: never any
 
 
 class PGMORL(Method[PGMORLState]):
@@ -138,6 +139,7 @@ class PGMORL(Method[PGMORLState]):
         document = {
             "buffer": [policy.id for policy in state.buffer.members],
             **{name: getattr(state, name) for name in COUNTERS},
+            "limits": state.limits and [limit if np.isfinite(limit) else None for limit in state.limits],
         }
         return PackedSearch(document, {"bounds": state.bounds, **records}, state.buffer.members)
 
@@ -151,8 +153,14 @@ class PGMORL(Method[PGMORLState]):
             nothing = np.full_like(arrays[names[0]], np.nan)
             records = Records(*(arrays.get(each, nothing) for each in names))
         state = self._state(tuple(policies[each] for each in document["buffer"]), records)
-        # Runs of earlier versions have fewer counters, and their bounds never gave way.
-        return replace(state, bounds=arrays["bounds"], **{name: document.get(name, 0) for name in COUNTERS})
+        # Runs of earlier versions have fewer counters; their bounds never gave way, and nobody could set limits.
+        limits = document.get("limits")
+        return replace(
+            state,
+            bounds=arrays["bounds"],
+            **{name: document.get(name, 0) for name in COUNTERS},
+            limits=limits and tuple(-np.inf if limit is None else float(limit) for limit in limits),
+        )
 
     def _state(self, members: tuple[Policy, ...], records: Records) -> PGMORLState:
         search = self.problem.search

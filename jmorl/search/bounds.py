@@ -33,11 +33,17 @@ def widened_bounds(
     least_slack: np.ndarray,  # [M] >= 0, whatever the preferred values
     values: np.ndarray,  # [N, M]
     least_within: int,
+    limits: Sequence[float] | None = None,  # [M] -inf where there is none
 ) -> Bounds:
-    """Return `lower_bounds`, their slack doubled until so many of the vectors reach them, 7 times at most."""
+    """Return `lower_bounds`, their slack doubled until so many of the vectors reach them, 7 times at most.
+
+    Where the preferred values reach a limit, the bound stays above it but for the slack before it was doubled.
+    """
     slack = np.maximum(delta * np.sqrt(unit * np.abs(preferred)), least_slack)
     for widenings in range(MOST_WIDENINGS + 1):
         lower = preferred - 2**widenings * slack
+        if limits is not None:
+            lower = np.maximum(lower, np.minimum(limits, preferred) - slack)
         if within(values, lower).sum() >= least_within:
             break
     return Bounds(lower, widenings)

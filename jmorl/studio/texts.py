@@ -78,7 +78,7 @@ def heading(view: View, selection: Selection) -> str:
         label = view.objectives[selection.more_of].label
         return f"{plural(len(more), 'policy')} better in {label} than policy {selection.than}"
     if question:
-        return front_question(question.purpose, question.generation, len(question.front))
+        return front_question(question.purpose, question.generation, len(question.front), question.form, question.again)
     if view.result:
         return f"The result is policy {view.result.id}: {scores(view, view.result)}"
     if view.timeline is None:

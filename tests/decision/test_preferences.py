@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jmorl.decision.preferences import Choice, PreferenceModel
+from jmorl.decision.preferences import Comparison, PreferenceModel
 
 SPANS, ORIGIN = np.array([100.0, 30.0, 7.0]), np.array([-900.0, 3.0, 0.0])
 
@@ -42,7 +42,8 @@ def elicited(utility, seed, objectives, mistakes=0.0):
             losses.append((worth.max() - worth[verdict.best]) / np.ptp(worth))
         else:
             wrong = generator.random() < mistakes
-            choices.append(Choice(front, int(generator.integers(len(front)) if wrong else worth.argmax())))
+            best = int(generator.integers(len(front)) if wrong else worth.argmax())
+            choices.append(Comparison(front, (best,)))
     return len(choices), losses
 
 
@@ -69,21 +70,21 @@ def test_without_answers_nothing_is_sure():
 def test_units_do_not_matter_and_the_same_answers_give_the_same_posterior():
     first, second = fronts(np.random.default_rng(0), 2, 2)
     factor, shift = np.array([1e-3, 1e4]), np.array([7.0, -1e5])
-    plain = PreferenceModel(second, [Choice(first, 5)], 3)
-    scaled = PreferenceModel(second * factor + shift, [Choice(first * factor + shift, 5)], 3)
+    plain = PreferenceModel(second, [Comparison(first, (5,))], 3)
+    scaled = PreferenceModel(second * factor + shift, [Comparison(first * factor + shift, (5,))], 3)
     np.testing.assert_allclose(plain.utilities(second), scaled.utilities(second * factor + shift), atol=1e-6)
     np.testing.assert_array_equal(
-        plain.utilities(second), PreferenceModel(second, [Choice(first, 5)], 3).utilities(second)
+        plain.utilities(second), PreferenceModel(second, [Comparison(first, (5,))], 3).utilities(second)
     )
 
 
 def test_more_is_never_worth_less():
     first, second = fronts(np.random.default_rng(2), 2, 3)
-    model = PreferenceModel(second, [Choice(first, 4)], 0)
+    model = PreferenceModel(second, [Comparison(first, (4,))], 0)
     assert (model.utilities(second + 0.1 * SPANS) >= model.utilities(second) - 1e-12).all()
 
 
 def test_an_objective_without_range_and_a_front_of_one_are_judged():
     flat = np.array([[1.0, 5.0], [2.0, 5.0]])
-    assert PreferenceModel(flat, [Choice(flat, 1)], 0).verdict().best == 1
-    assert PreferenceModel(flat[:1], [Choice(flat, 1)], 0).verdict().regret == 0
+    assert PreferenceModel(flat, [Comparison(flat, (1,))], 0).verdict().best == 1
+    assert PreferenceModel(flat[:1], [Comparison(flat, (1,))], 0).verdict().regret == 0
