@@ -46,6 +46,7 @@ BASELINE: Mapping[str, Any] = {
     "evaluation.actions": "deterministic",
     "evaluation.units": "raw",
     "evaluation.scale_discount": 0.995,
+    "evaluation.confirmation_episodes": 0,
     "search.delta": 0.1,
     "search.bounds_scale": "range",
     "search.least_slack": 0.0,
@@ -66,6 +67,7 @@ ADDED_SINCE_FORMAT_1 = frozenset(
     {
         "ask",
         "question",
+        "evaluation.confirmation_episodes",
         "population.weights",
         "search.least_slack",
         "search.least_within",

@@ -17,6 +17,7 @@ import envs
 from envs.checks import check_same
 from envs.core import Environment
 from jmorl.config import Config
+from jmorl.confirmation import confirmed, finalists
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
 from jmorl.decision.remembered import RunRecord
 from jmorl.decision.stand_in import StandIn
@@ -34,6 +35,8 @@ from jmorl.search.scaling import REFERENCE_MARGIN, range_scale
 from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
 from jmorl.units import initial_units, measured_in
+
+CONFIRMATION = 2**32 - 1  # the stream of random numbers of confirmations; evaluations count from 0
 
 
 def run(
@@ -102,6 +105,12 @@ def _keys(config: Config) -> jax.Array:
 
 
 @own_settings()
+def _confirmation_key(config: Config) -> jax.Array:
+    """Return the key of the starts that confirm scores, which no evaluation uses."""
+    return jax.random.fold_in(_keys(config)[2], CONFIRMATION)
+
+
+@own_settings()
 def _training_key(config: Config, generation: int) -> jax.Array:
     return jax.random.fold_in(_keys(config)[1], generation)
 
@@ -138,7 +147,8 @@ class _Run:
             while question := self.method.question(state):
                 state, decided = yield from self._decided(state, question)
                 if decided.chosen and question.stops(decided.answer):
-                    yield RunFinished(state, decided.chosen, "stopped")
+                    state, [chosen] = self._confirmed(state, [decided.chosen])
+                    yield RunFinished(state, chosen, "stopped")
                     return
             finished = self.generation(state)
             yield finished
@@ -146,9 +156,12 @@ class _Run:
         satisfied = self._satisfied(state)
         # What satisfies may lie outside the bounds: the search is not the only one that finds things.
         front = state.archive.members if satisfied else self.method.final_front(state)
-        state, decided = yield from self._decided(state, self._final_question(state, front))
+        best = finalists(front, None if satisfied else state.choice, self.population.size)
+        state, best = self._confirmed(state, best)
+        state, decided = yield from self._decided(state, self._final_question(state, best or front, front))
         assert decided.chosen is not None
-        yield RunFinished(state, decided.chosen, "satisfied" if satisfied else "budget")
+        state, [chosen] = self._confirmed(state, [decided.chosen])
+        yield RunFinished(state, chosen, "satisfied" if satisfied else "budget")
 
     def warm_up(self) -> GenerationFinished:
         """Train and evaluate P new agents: generation 0."""
@@ -204,11 +217,27 @@ class _Run:
         silent = self.method.generations_to_question(state.search)
         return state, Decided(question, answer, chosen, self.method.bounds(state.search), silent, seconds)
 
-    def _final_question(self, state: RunState, front: Sequence[Policy]) -> Question:
+    def _confirmed(self, state: RunState, policies: Sequence[Policy]) -> tuple[RunState, list[Policy]]:
+        """Return the policies with scores from fresh starts, as the config wants, unless they have them already."""
+        episodes, evaluation = self.config.evaluation.confirmation_episodes, self.config.evaluation
+        todo = [policy for policy in policies if policy.confirmation is None]
+        if not episodes or not todo or evaluation.units == "paper":  # paper units would move
+            return state, list(policies)
+        scored, steps = confirmed(todo, self.population, _confirmation_key(self.config), episodes, evaluation.episodes)
+        by_id = {policy.id: policy for policy in scored}
+        state = replace(state, evaluation_steps=state.evaluation_steps + steps)
+        return state, [by_id.get(policy.id, policy) for policy in policies]
+
+    def _final_question(self, state: RunState, shown: Sequence[Policy], front: Sequence[Policy]) -> Question:
+        """Return the last question, which shows some of a front."""
         previous = state.choice.id if state.choice else None
         bounds = self.method.bounds(state.search)
         objectives, limits = self.method.problem.objectives, self.method.limits(state.search)
-        return Question("final", state.generation + 1, objectives, tuple(front), bounds, previous, limits=limits)
+        ids = [policy.id for policy in shown]
+        others = tuple(policy for policy in front if policy.id not in ids)
+        return Question(
+            "final", state.generation + 1, objectives, tuple(shown), bounds, previous, others, limits=limits
+        )
 
     def _steps(self, state: RunState) -> int:
         """Return the environment steps used for learning so far."""

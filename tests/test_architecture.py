@@ -34,8 +34,18 @@ MAY_IMPORT = {
     "jmorl.evaluation": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.playback": {"envs", "jax", "jmorl.learning", "jmorl.storage"},
     "jmorl.events": {"jmorl.decision", "jmorl.search", "jmorl.state"},
+    "jmorl.confirmation": {"jax", "jmorl.learning", "jmorl.scoring", "jmorl.search"},
     "jmorl.loop": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.methods"),
+        *(
+            "envs",
+            "jax",
+            "jmorl.config",
+            "jmorl.confirmation",
+            "jmorl.decision",
+            "jmorl.events",
+            "jmorl.learning",
+            "jmorl.methods",
+        ),
         *("jmorl.scoring", "jmorl.search", "jmorl.state", "jmorl.units"),
     },
     "jmorl.storage": {

@@ -54,6 +54,7 @@ OTHER = {
     "evaluation.actions": "sampled",
     "evaluation.units": "paper",
     "evaluation.scale_discount": 0.99,
+    "evaluation.confirmation_episodes": 32,
     "search.delta": 0.3,
     "search.least_slack": 0.02,
     "search.least_within": 6,

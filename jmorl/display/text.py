@@ -7,6 +7,7 @@ import numpy as np
 
 from envs.core import Objective
 from jmorl.display.limits import core
+from jmorl.search.policy import Policy
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 REASONS = {  # why a run ended
@@ -83,6 +84,20 @@ def front_question(purpose: str, generation: int, policies: int, form: str = "be
 def objective_label(objective: Objective) -> str:
     """Return the quantity and its unit, for headings and axes."""
     return f"{objective.label} ({objective.unit})"
+
+
+def confirmed_in_words(policy: Policy, objectives: Sequence[Objective]) -> str:
+    """`time -58.2 ±0.4, ... on 128 fresh episodes; time -57.9, ... in the search`; nothing if it is not confirmed."""
+    found = policy.confirmation
+    if found is None:
+        return ""
+    formats = [number_format(np.array([0.0, error]), digits=2) for error in found.error]
+    scores = ", ".join(
+        f"{objective.label} {value:{fmt}} ±{error:{fmt}}"
+        for objective, value, error, fmt in zip(objectives, policy.values, found.error, formats, strict=True)
+    )
+    claimed = values_in_words(found.claimed, objectives, formats)
+    return f"{scores} on {found.episodes} fresh episodes; {claimed} in the search"
 
 
 def values_in_words(

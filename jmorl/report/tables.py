@@ -13,7 +13,15 @@ from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
 from jmorl.display.fronts import front_table, stacked_label
 from jmorl.display.tables import PlainTable
-from jmorl.display.text import REASONS, duration, number_format, objective_label, plural, short_count
+from jmorl.display.text import (
+    REASONS,
+    confirmed_in_words,
+    duration,
+    number_format,
+    objective_label,
+    plural,
+    short_count,
+)
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.search.metrics import coverage
 from jmorl.search.policy import values_of
@@ -45,6 +53,9 @@ def run_heading(run: StoredRun) -> RenderableType:
         "time": f"{duration(seconds)}, {short_count(steps / seconds)} steps/s; answers not counted",
         "state": f"finished: {REASONS[run.result['reason']]}" if run.result else "unfinished",
     }
+    result = confirmed_in_words(run.chosen, run.objectives) if run.chosen else ""
+    if run.chosen and result:
+        rows["result"] = f"policy {run.chosen.id}: {result}"
     held = coverage(run.policies)
     if held is not None:
         known = sum(policy.interval is not None for policy in run.policies)

@@ -14,10 +14,19 @@ from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_table
-from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.display.text import (
+    REASONS,
+    confirmed_in_words,
+    duration,
+    number,
+    number_format,
+    plural,
+    short_count,
+    values_in_words,
+)
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Confirmation, Policy
 
 
 class Watcher(ABC):
@@ -75,7 +84,9 @@ class Lines(Watcher):
                 why = "" if event.question.was_asked(event.answer) else f" ({event.answer.reason})"
                 return f"{question_name(event)}: {choice_in_words(event, self.objectives)}{why}"
             case RunFinished():
-                return f"finished: {REASONS[event.reason]}; the result is policy {event.chosen.id}"
+                found = confirmed_in_words(event.chosen, self.objectives)
+                result = f"policy {event.chosen.id}" + (f": {found}" if found else "")
+                return f"finished: {REASONS[event.reason]}; the result is {result}"
 
     def _generation_line(self, event: GenerationFinished) -> str:
         generation, seconds = event.state.generation, event.seconds
@@ -119,7 +130,8 @@ class Json(Watcher):
          next question, "stand_in": whether a stand-in answered, "reason": why), "seconds"}
         {"event": "finished", "reason": "budget", "satisfied" or "stopped", "chosen": policy}
 
-    A policy is {"policy": its id, "generation", "parent", "weights", "values", "std"}.
+    A policy is {"policy": its id, "generation", "parent", "weights", "values", "std"}. Where its values are confirmed
+    it has "confirmation_episodes", "error" (of the values, 99 of 100) and "claimed" (what the search went by).
     """
 
     def __init__(self, config: Config, file: TextIO):
@@ -219,6 +231,17 @@ def _policy_fields(policy: Policy) -> dict[str, Any]:
         "weights": policy.weights.tolist(),
         "values": policy.values.tolist(),
         "std": policy.std.tolist(),
+        **_confirmation_fields(policy.confirmation),
+    }
+
+
+def _confirmation_fields(confirmation: Confirmation | None) -> dict[str, Any]:
+    if confirmation is None:
+        return {}
+    return {
+        "confirmation_episodes": confirmation.episodes,
+        "error": confirmation.error.tolist(),
+        "claimed": confirmation.claimed.tolist(),
     }
 
 

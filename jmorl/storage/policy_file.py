@@ -119,7 +119,7 @@ def save_policy(
         "score": policy.values.tolist(),  # other than the values only in paper units
         "std": policy.std.tolist(),
         "discounted": policy.discounted.tolist(),
-        "evaluation_episodes": config.evaluation.episodes,
+        "evaluation_episodes": policy.confirmation.episodes if policy.confirmation else config.evaluation.episodes,
         "discount": config.ppo.discount,
         "run": {"id": run, "config": config.identity(), "method": config.method, "seed": config.seed},
         "network": {

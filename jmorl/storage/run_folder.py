@@ -162,7 +162,7 @@ class RunFolder:
     def _record_result(self, event: RunFinished) -> None:
         self.checkpoints.wait()
         self._save_policy(self.layout.chosen, event.chosen)
-        result = {"reason": event.reason, "finished": now(), "chosen": self._policy_row(event.chosen)}
+        result = {"reason": event.reason, "finished": now(), "chosen": self._chosen_row(event.chosen)}
         write_json(self.layout.result, result)
 
     def _save_policy(self, path: Path, policy: Policy) -> None:
@@ -185,6 +185,19 @@ class RunFolder:
             **asdict(event.front),
             "utility_max": event.utility_max,
             **event.search,
+        }
+
+    def _chosen_row(self, policy: Policy) -> Row:
+        """Return the row of the result; where its values are confirmed, with their errors and what was claimed."""
+        found = policy.confirmation
+        if found is None:
+            return self._policy_row(policy)
+        return {
+            **self._policy_row(policy),
+            "confirmation_episodes": found.episodes,
+            **self._named("error", found.error),
+            **self._named("claimed", found.claimed),
+            **self._named("claimed_std", found.claimed_std),
         }
 
     def _policy_row(self, policy: Policy) -> Row:

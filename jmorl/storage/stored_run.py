@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +15,7 @@ import envs
 from envs.core import Objective
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.records import DecisionRecord, Record, ScriptError, read_log
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Confirmation, Policy
 from jmorl.storage.csv_log import read_rows
 from jmorl.storage.documents import check_fields, json_object
 from jmorl.storage.layout import Layout
@@ -59,8 +59,11 @@ class StoredRun:
 
     @property
     def chosen(self) -> Policy | None:
-        """The run's result; None for a run that has not ended."""
-        return self.policies[self.result["chosen"]["policy"]] if self.result else None
+        """The run's result, with its confirmed score if it has one; None for a run that has not ended."""
+        if not self.result:
+            return None
+        row = self.result["chosen"]
+        return _as_confirmed(self.policies[row["policy"]], row, self.objectives)
 
     @property
     def below_reference(self) -> int:
@@ -168,6 +171,18 @@ def _number(cell: str) -> float:
     """Return the number of a cell; NaN for an empty one, and for infinity, of which nothing can be drawn."""
     number = float(cell) if cell else np.nan
     return number if np.isfinite(number) else np.nan
+
+
+def _as_confirmed(policy: Policy, row: Mapping[str, Any], objectives: tuple[Objective, ...]) -> Policy:
+    """Return the policy as the row of a result has it: with confirmed values, where there are some."""
+    if "confirmation_episodes" not in row:
+        return policy
+    value, std, error, claimed, claimed_std = (
+        np.array([row[f"{prefix}_{objective.name}"] for objective in objectives], float)
+        for prefix in ("value", "std", "error", "claimed", "claimed_std")
+    )
+    confirmation = Confirmation(claimed, claimed_std, row["confirmation_episodes"], error)
+    return replace(policy, values=value, std=std, confirmation=confirmation)
 
 
 def _whole_number(cell: str) -> int:

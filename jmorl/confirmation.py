@@ -1,0 +1,80 @@
+"""Confirmed scores: what finalists are worth on fresh starts, which had no part in picking them.
+
+The score that picked a policy may flatter it: the same starts score all policies of a run, so that the best of many is
+the luckiest, too, and a rare fall may not be among them.
+
+Letters: P agents, N policies, M objectives.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from statistics import NormalDist
+
+import jax
+import numpy as np
+
+from jmorl.learning.population import Population
+from jmorl.scoring import raw_scores
+from jmorl.search.policy import Confirmation, Policy, values_of
+from jmorl.search.scaling import range_scale
+
+FINALISTS = 4  # times P: as many policies are confirmed before the last question, at most
+CONFIDENCE = 0.99  # that the error of a confirmed score covers the mean of all starts, in each objective
+
+
+def finalists(front: Sequence[Policy], choice: Policy | None, agents: int) -> list[Policy]:
+    """Return the policies of a front that the result is likely to be among: all of a few, else those near the choice.
+
+    None where there are many, and no choice.
+    """
+    most = FINALISTS * agents
+    if len(front) <= most:
+        return list(front)
+    if choice is None:
+        return []
+    scale = range_scale(values_of(front))
+    distances = np.linalg.norm(scale.apply(values_of(front)) - scale.apply(choice.values), axis=1)
+    nearest = set(np.argsort(distances, kind="stable")[:most].tolist())
+    return [policy for index, policy in enumerate(front) if index in nearest]
+
+
+def confirmed(
+    policies: Sequence[Policy], population: Population, key: jax.Array, episodes: int, at_once: int
+) -> tuple[list[Policy], int]:
+    """Return the policies with scores from so many fresh episodes or a few more, and the environment steps of these.
+
+    All are scored from the same starts, drawn from `key`, `at_once` in each call of the compiled program.
+    """
+    rounds = -(-episodes // at_once)
+    found: list[Policy] = []
+    steps = 0
+    for some in _batches(policies, population.size):
+        train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(policy.snapshot for policy in some))
+        returns = []
+        for number in range(rounds):
+            scored = population.evaluate(train_states, jax.random.split(jax.random.fold_in(key, number), at_once))
+            returns.append(np.asarray(scored.undiscounted, np.float64))
+            steps += raw_scores(scored).steps
+        together = np.concatenate(returns, axis=1)  # [P, episodes, M]
+        found += [_confirmed(policy, each) for policy, each in zip(some, together, strict=True)]
+    return found[: len(policies)], steps
+
+
+def _batches(policies: Sequence[Policy], size: int) -> Iterator[list[Policy]]:
+    """Yield P policies at a time; the last ones filled up with the first of them."""
+    for start in range(0, len(policies), size):
+        some = list(policies[start : start + size])
+        yield some + some[:1] * (size - len(some))
+
+
+def _confirmed(policy: Policy, returns: np.ndarray) -> Policy:
+    """Return the policy with the score of episodes [episodes, M]."""
+    quantile = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
+    std, episodes = returns.std(axis=0), len(returns)
+    error = quantile * std / np.sqrt(max(episodes - 1, 1))
+    return replace(
+        policy,
+        values=returns.mean(axis=0),
+        std=std,
+        confirmation=Confirmation(policy.values, policy.std, episodes, error),
+    )
