@@ -211,14 +211,14 @@ def _add_settings(parser: argparse.ArgumentParser, group: Any, section: type[Sec
 
 
 def _in_presets(path: Sequence[str], default: str) -> Iterator[str]:
-    """`ENV: value`, and what other presets say, for each environment in which a preset changes a setting."""
-    for env in PRESETS["default"]:
-        values = {
-            preset: _preset_value(environments.get(env, {}), path, default) for preset, environments in PRESETS.items()
-        }
+    """Yield what presets say of a setting: first everywhere, then `ENV: value` for environments of which they do."""
+    everywhere = {name: _preset_value(preset.everywhere, path, default) for name, preset in PRESETS.items()}
+    yield from (f"in preset {name} {value}" for name, value in everywhere.items() if value != default)
+    for env in PRESETS["default"].environments:
+        values = {name: _preset_value(preset.settings(env), path, default) for name, preset in PRESETS.items()}
         usual = values.pop("default")
         others = [f"in preset {preset} {value}" for preset, value in values.items() if value != usual]
-        if others or usual != default:
+        if any(_preset_value(preset.environments.get(env, {}), path, "") for preset in PRESETS.values()):
             yield f"{env}: {', '.join([usual, *others])}"
 
 

@@ -21,7 +21,7 @@ from jmorl import config_format
 from jmorl.decision.users import parse_user
 from jmorl.learning.settings import EvaluationConfig, LearningConfig, PPOConfig
 from jmorl.methods import registry
-from jmorl.presets import PRESETS
+from jmorl.presets import PRESETS, merged
 from jmorl.search.settings import MOST_OBJECTIVES, SearchConfig
 from jmorl.search.weights import evenly_spaced_weights
 from jmorl.settings import Count, Finite, NonNegative, Section
@@ -83,7 +83,7 @@ class Config(Section):
         description="who decides: A, B, C, weights=0.6,0.4[,chebyshev], target=-80,-42, terminal, script=FILE",
     )
     ask: Literal["always", "unsure"] = Field(
-        "always", description="whom: the user always, or only where their answers so far leave open what they prefer"
+        "unsure", description="whom: the user always, or only where their answers so far leave open what they prefer"
     )
     question: Literal["front", "few", "pair", "rank"] = Field(
         "front",
@@ -197,7 +197,7 @@ class Config(Section):
 
     def replace(self, **changes: Any) -> Self:
         """Return a validated copy; sections are given as dicts of what changes in them."""
-        return _validated(type(self), _merged(self.model_dump(), changes))
+        return _validated(type(self), merged(self.model_dump(), changes))
 
     def to_toml(self) -> str:
         """Return the config as a file that `resolve` reads back to the same config."""
@@ -208,8 +208,8 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
     """Return preset, then config file (TOML), then overrides, validated.
 
     Overrides are nested, or named `section.field`; strings are parsed.
-    An environment without an entry in the preset takes the general defaults. A file that a run wrote has every setting;
-    one that was added since means what was done before there was such a setting, whatever the preset. Raises
+    An environment without an entry in the preset takes what that sets everywhere. A file that a run wrote has every
+    setting; one that was added since means what was done before there was such a setting, whatever the preset. Raises
     ConfigError with every problem of all three.
     """
     problems = []
@@ -235,12 +235,12 @@ def resolve(preset: str = "default", file: Path | None = None, overrides: Mappin
         given = _by_section(overrides or {})
     except ValueError as error:
         problems.append(str(error))
-    chosen = _merged(from_file, given)
+    chosen = merged(from_file, given)
     env = chosen.get("env", Config.model_fields["env"].default)
-    base = PRESETS.get(preset, {}).get(envs.plain_id(env), {}) if isinstance(env, str) else {}
+    base = PRESETS[preset].settings(envs.plain_id(env) if isinstance(env, str) else "") if preset in PRESETS else {}
     if written is not None:
         base = config_format.before_settings_were_added()
-    return _validated(Config, _merged(base, chosen), problems)
+    return _validated(Config, merged(base, chosen), problems)
 
 
 def _by_section(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -258,15 +258,6 @@ def _by_section(settings: Mapping[str, Any]) -> dict[str, Any]:
             raise ValueError(f"{min(twice)} is given twice")
         plain[section] = {**plain[section], **inner} if both_are_sections else inner
     return plain
-
-
-def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `changes` over `base`, section by section."""
-    merged = dict(base)
-    for name, value in changes.items():
-        below = merged.get(name)
-        merged[name] = _merged(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
-    return merged
 
 
 def _validated(kind: type[C], values: Mapping[str, Any], problems: list[str] | None = None) -> C:

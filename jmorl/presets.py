@@ -1,7 +1,38 @@
 """What the presets set, by environment: data only."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
+
+
+def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `changes` over `base`, section by section."""
+    found = dict(base)
+    for name, value in changes.items():
+        below = found.get(name)
+        found[name] = merged(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
+    return found
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What differs from the defaults of the settings."""
+
+    environments: Mapping[str, Mapping[str, Any]]  # by environment
+    everywhere: Mapping[str, Any] = field(default_factory=dict)
+
+    def settings(self, env: str) -> dict[str, Any]:
+        """Return what the preset sets for an environment."""
+        return merged(self.everywhere, self.environments.get(env, {}))
+
+
+# The paper's search: bounds never give way, the user is always asked about the whole front, scores are as they are.
+PAPER_RULE: Mapping[str, Any] = {
+    "ask": "always",
+    "question": "front",
+    "evaluation": {"confirmation_episodes": 0},
+    "search": {"least_slack": 0.0, "least_within": 0, "outside_share": 0.0},
+}
 
 _PAPER_CAR = {
     "population": {"agents": 6, "warmup_iterations": 10, "iterations": 10},
@@ -42,8 +73,7 @@ _TUNED_CHEETAH = {
     "ppo": {"environments": 16, "rollout_steps": 100, "minibatches": 16, "discount": 0.99},
 }
 
-# preset -> environment -> what differs from the defaults above
-PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "default": {"mo-halfcheetah-v5": _TUNED_CHEETAH, "mo-mountaincarcontinuous-v0": _TUNED_CAR},
-    "paper": {"mo-halfcheetah-v5": _PAPER_CHEETAH, "mo-mountaincarcontinuous-v0": _PAPER_CAR},
+PRESETS: Mapping[str, Preset] = {
+    "default": Preset({"mo-halfcheetah-v5": _TUNED_CHEETAH, "mo-mountaincarcontinuous-v0": _TUNED_CAR}),
+    "paper": Preset({"mo-halfcheetah-v5": _PAPER_CHEETAH, "mo-mountaincarcontinuous-v0": _PAPER_CAR}, PAPER_RULE),
 }

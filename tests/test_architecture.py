@@ -67,7 +67,7 @@ MAY_IMPORT = {
     },
     "jmorl.paper": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.experiments"),
-        *("jmorl.report", "jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
+        *("jmorl.presets", "jmorl.report", "jmorl.search", "jmorl.signals", "jmorl.storage", "jmorl.units"),
     },
 }
 JAX = {"jax", "flax", "optax", "chex"}

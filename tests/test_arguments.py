@@ -20,19 +20,22 @@ def told(capsys):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize("env", PRESETS["default"])
+@pytest.mark.parametrize("env", PRESETS["default"].environments)
 def test_the_help_tells_the_values_that_a_run_gets(told, env, preset):
     for name, (description, *lines) in told.items():
         value = resolve(preset, None, {"env": env}).model_dump()
         for part in name.split("."):
             value = value[part]
         written = ",".join(f"{each:g}" for each in value) if isinstance(value, tuple) else str(value)
+        everywhere = dict(line.removeprefix("in preset ").split() for line in lines if line.startswith("in preset "))
         mentions = [line.removeprefix(f"{env}: ").split(", in preset ") for line in lines if line.startswith(env)]
         if name == "env":
             written = SETTINGS["env"]  # which the parentheses are about
         if mentions:
             usual, *others = mentions[0]
             assert dict(other.split() for other in others).get(preset, usual) == written, name
+        elif preset in everywhere:
+            assert everywhere[preset] == written, name
         else:
             assert description.endswith(f" ({written})") or not written, name
 

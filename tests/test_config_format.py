@@ -4,8 +4,9 @@ import pytest
 
 from jmorl import config_format
 from jmorl.config import Config, ConfigError, resolve
+from jmorl.presets import PAPER_RULE
 
-FORMAT_1_DEFAULT = "de2fb9c202325fb9"  # the digest of `resolve()` in the first version
+FORMAT_1_DEFAULT = "de2fb9c202325fb9"  # the digest of `resolve()` in the first version, which had the paper's search
 FORMAT_1_PAPER = "fbdcd9303d5a0ae3"  # of `resolve("paper", overrides={"env": "mo-halfcheetah-v5", "user": "C"})`
 
 
@@ -20,14 +21,15 @@ def test_the_baseline_is_a_config_without_differences():
 
 
 def test_identities_of_the_first_format_are_known():
-    assert resolve().is_identified_by(FORMAT_1_DEFAULT)
+    assert resolve(overrides=PAPER_RULE).is_identified_by(FORMAT_1_DEFAULT)
+    assert not resolve().is_identified_by(FORMAT_1_DEFAULT)
     paper = resolve("paper", overrides={"env": "mo-halfcheetah-v5", "user": "C"})
     assert paper.is_identified_by(FORMAT_1_PAPER)
     assert not paper.replace(seed=2).is_identified_by(FORMAT_1_PAPER)
 
 
 def test_a_setting_of_today_cannot_hide_behind_an_identity_of_the_first_format():
-    weighted = resolve(overrides={"population": {"weights": (1.0, 0.0) * 6}})
+    weighted = resolve(overrides=PAPER_RULE | {"population": {"weights": (1.0, 0.0) * 6}})
     assert not weighted.is_identified_by(FORMAT_1_DEFAULT)
     assert config_format.identity_of_format_1(weighted.model_dump(mode="json")) is None
 
@@ -64,7 +66,7 @@ def stagnation(config):
 def test_tomorrow_the_runs_of_today_are_what_they_are(tmp_path, request):
     """In both formats: their files mean what was done then, and their identities are known."""
     today = resolve(overrides={"user": "B", "population": {"weights": (1.0, 0.0) * 6}})
-    of_format_1 = resolve(overrides={"user": "B"})
+    of_format_1 = resolve(overrides=PAPER_RULE | {"user": "B"})
     second, first = tmp_path / "second.toml", tmp_path / "first.toml"
     second.write_text(today.to_toml(), encoding="utf-8")
     lines = of_format_1.to_toml().splitlines(keepends=True)

@@ -19,7 +19,7 @@ FORMS: dict[Shows, Form] = {"front": "best", "few": "best", "pair": "pair", "ran
 
 # The expected regret up to which the stand-in answers, in shares of the utility's range over the front. A choice that
 # steers can be corrected in the next generation, the last one cannot.
-TRUSTED_REGRET = {"steer": 0.02, "final": 0.01}
+TRUSTED_REGRET = {"steer": 0.05, "final": 0.02}
 DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
 FEW = 5  # policies in a short question
 

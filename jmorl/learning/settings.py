@@ -64,7 +64,7 @@ class EvaluationConfig(Section):
         "raw", description="mean undiscounted return, or the paper's: discounted, rewards over their running deviation"
     )
     confirmation_episodes: Annotated[int, Field(ge=0)] = Field(
-        0, description="fresh episodes that score the finalists anew before the last question; 0: none (the paper)"
+        128, description="fresh episodes that score the finalists anew before the last question; 0: none (the paper)"
     )
     scale_discount: Annotated[float, Field(gt=0, le=1)] = Field(
         0.995, description="paper units: gamma of the sums whose running deviation divides rewards"

@@ -12,6 +12,7 @@ from jmorl.config import resolve
 from jmorl.decision.utility import USERS
 from jmorl.experiments.cells import Cell
 from jmorl.paper.data import Targets, honest, published
+from jmorl.presets import PAPER_RULE, merged
 
 CAR, CHEETAH = "mo-mountaincarcontinuous-v0", "mo-halfcheetah-v5"
 NAMES = {CAR: "mountaincar", CHEETAH: "halfcheetah"}
@@ -172,7 +173,8 @@ class Plan:
     def _cell(self, env: str, units: str, method: str, user: str, goal: str, seed: int, to_cap: bool) -> Cell:
         kind = "interactive" if method == "interactive" else "pgmorl"
         chosen = {"env": env, "method": kind, "user": user, "seed": seed, "checkpoints": {"keep": 2}}
-        config = resolve("paper" if units == "paper" else "default", None, chosen)
+        # In raw units learning is ours, and the search the paper's.
+        config = resolve("paper" if units == "paper" else "default", None, merged(PAPER_RULE, chosen))
         if units == "paper":
             config = config.replace(**AUTHORS, reference_point=REFERENCE[env])
         if self.quick:

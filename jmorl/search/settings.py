@@ -17,10 +17,10 @@ class SearchConfig(Section):
         "range", description="s in the bounds: the archive's range of each objective, or 1 (the paper)"
     )
     least_slack: NonNegative = Field(
-        0.0, description="slack of the bounds at least, as a share of the archive's range; 0: none (the paper)"
+        0.02, description="slack of the bounds at least, as a share of the archive's range; 0: none (the paper)"
     )
     least_within: Annotated[int, Field(ge=0)] = Field(
-        0,
+        6,
         description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
     )
     outside_share: Annotated[float, Field(ge=0, le=1)] = Field(

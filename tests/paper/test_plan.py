@@ -23,6 +23,7 @@ from jmorl.paper.plan import (
     USER_STEPS,
     Plan,
 )
+from jmorl.presets import PAPER_RULE
 
 UNITS = ("raw", "paper")
 FULL, QUICK = Plan(), Plan(quick=True)
@@ -90,12 +91,12 @@ def test_in_paper_units_the_settings_are_the_authors(name, gamma_n, rollout, bud
     assert config.user.endswith(",unscaled")
 
 
-def test_in_raw_units_the_settings_are_this_programs_own():
+def test_in_raw_units_all_settings_but_the_papers_rule_are_this_programs_own():
     from jmorl.config import resolve
 
     config = FULL.cells(ITEMS["fig5"], "raw")[0].config
     own = resolve(overrides={"env": CAR, "user": "A", "seed": 1})
-    assert config == own.replace(checkpoints={"keep": 2}, steps=2_500_000)
+    assert config == own.replace(checkpoints={"keep": 2}, steps=2_500_000, **PAPER_RULE)
     assert (config.ppo.weights_on, config.search.buffer_size) == ("raw", 4)
 
 
