@@ -4,14 +4,22 @@ A, B, C                          the paper's artificial users, for two objective
 weights=0.6,0.4                  greatest weighted sum; any number of objectives
 weights=0.6,0.4,chebyshev        least weighted distance to the ideal point of the front
 weights=0.6,0.4,chebyshev=-60,0  the same, to a utopian point in raw units
+weights=0.6,0.4,concave=-120,-60,-60,-30  less and less for more of one: first what is worth 0, then what is worth most
 target=-80,-42                   nearest to a target in raw units, until one reaches it
 target=-80,-42,unscaled          the same, without scaling by the front's range, as in the paper
 terminal                         a person at this terminal
 script=FILE                      the decisions of an earlier run, from its decision log
+
+A user with weights may have options, behind a comma:
+
+random=0.2                       one answer in five is any of the policies shown
+temperature=0.05                 errs between policies whose utilities differ by little, in shares of their range
+before=0.2,0.8,until=6           had other weights before generation 6
+limits=none,-45                  rules out what has less; none: anything will do
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 
@@ -21,12 +29,30 @@ from envs.core import Objective
 from envs.names import did_you_mean, nearest
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.target import TargetUser
-from jmorl.decision.utility import USERS, UtilityUser, chebyshev_utility, linear_utility
+from jmorl.decision.utility import (
+    USERS,
+    Slips,
+    Utility,
+    UtilityUser,
+    chebyshev_utility,
+    concave_utility,
+    limited_utility,
+    linear_utility,
+)
 from jmorl.display.characters import to_path
 
 KNOWN = (
     f"{', '.join(USERS)}, weights=W1,W2,...[,chebyshev[=Z1,Z2,...]], target=Z1,Z2,...[,unscaled], terminal, script=FILE"
 )
+OPTIONS = {  # of users with weights, and how they are written
+    "chebyshev": "chebyshev=Z1,Z2,...",
+    "concave": "concave=WORST1,WORST2,...,BEST1,BEST2,...",
+    "random": "random=SHARE",
+    "temperature": "temperature=T",
+    "before": "before=W1,W2,...",
+    "until": "until=GENERATION",
+    "limits": "limits=Z1,none,...",
+}
 
 
 def make_user(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
@@ -44,8 +70,9 @@ def parse_user(spec: str, objectives: int | None) -> Callable[[], DecisionMaker]
     looked for when the decision maker is made. Raises ValueError with a sentence saying what is wrong.
     """
     kind, has_value, value = spec.strip().partition("=")
-    if spec.strip() in USERS:
-        return _paper_user(spec.strip(), objectives)
+    name, has_options, options = spec.strip().partition(",")
+    if name in USERS and (options or not has_options):
+        return _paper_user(name, options, objectives)
     if kind == "weights" and has_value:
         return _weighted_user(value, objectives)
     if kind == "target" and has_value:
@@ -58,29 +85,109 @@ def parse_user(spec: str, objectives: int | None) -> Callable[[], DecisionMaker]
     raise ValueError(f"unknown user {spec!r}; known: {KNOWN}{near}")
 
 
-def _paper_user(name: str, objectives: int | None) -> Callable[[], DecisionMaker]:
+def _paper_user(name: str, options: str, objectives: int | None) -> Callable[[], DecisionMaker]:
     if objectives not in (None, 2):
         raise ValueError(
             f"user {name} has weights for two objectives, but there are {objectives}; write weights=W1,W2,... instead"
         )
-    return partial(UtilityUser, linear_utility(USERS[name]))
+    weights = ",".join(str(weight) for weight in USERS[name])
+    return _weighted_user(f"{weights},{options}" if options else weights, objectives)
 
 
-def _weighted_user(value: str, objectives: int | None) -> Callable[[], DecisionMaker]:
-    listed, chebyshev, utopian = value.partition(",chebyshev")
-    weights = _numbers(listed, "weights", objectives)
+def _weighted_user(written: str, objectives: int | None) -> Callable[[], DecisionMaker]:
+    """Return a user of weights, and options as in `OPTIONS`, all separated by commas."""
+    options = _options(written)
+    weights = _weights(options["weights"], "weights", objectives)
+    count = len(weights)
+    shape = _shape(options, count)
+    limits = tuple(_limits(options["limits"], count)) if "limits" in options else None
+    slips = Slips(_number(options, "random", most=1.0), _number(options, "temperature"))
+    before = _weights(options["before"], "before", count) if "before" in options else None
+    changes_in = _number(options, "until")
+    if (before is None) != ("until" not in options) or not changes_in.is_integer():
+        raise ValueError("who changes their mind needs before=W1,W2,... and until=GENERATION, a whole number")
+
+    def utility(some: list[float]) -> Utility:
+        return limited_utility(shape(some), limits) if limits else shape(some)
+
+    return partial(
+        UtilityUser,
+        utility(weights),
+        comparable=options.get("chebyshev", "given") != "",
+        slips=slips,
+        before=utility(before) if before else None,
+        changes_in=int(changes_in),
+        limits=limits,
+    )
+
+
+def _options(written: str) -> dict[str, str]:
+    """Return what is written of weights and of each option; a word without an option's name goes on with the last."""
+    listed: dict[str, list[str]] = {"weights": []}
+    name = "weights"
+    for word in written.split(","):
+        key, has_value, value = word.strip().partition("=")
+        if key in listed and has_value:
+            raise ValueError(f"{key} is given twice")
+        if key in OPTIONS:
+            if not has_value and key != "chebyshev":
+                raise ValueError(f"{key} has no value; write {OPTIONS[key]}")
+            if has_value and not value.strip():
+                raise ValueError(f"{key} must be numbers separated by commas, but {value!r} is none")
+            name = key
+            listed[name] = [value] if has_value else []
+        elif has_value:
+            near = did_you_mean(nearest(key, OPTIONS))
+            raise ValueError(f"a user has no option {key!r}; known: {', '.join(OPTIONS.values())}{near}")
+        else:
+            listed[name].append(word)
+    options = {name: ",".join(words) for name, words in listed.items()}
+    return options
+
+
+def _shape(options: Mapping[str, str], count: int) -> Callable[[list[float]], Utility]:
+    """Return what makes a utility of weights: linear, Chebyshev or concave."""
+    if "chebyshev" in options and "concave" in options:
+        raise ValueError("a utility is either chebyshev or concave, not both")
+    if "chebyshev" in options:
+        utopian = _numbers(options["chebyshev"], "chebyshev", count) if options["chebyshev"] else None
+        return partial(chebyshev_utility, utopian=utopian)
+    if "concave" not in options:
+        return linear_utility
+    points = _numbers(options["concave"], "concave", 2 * count)
+    worst, best = points[:count], points[count:]
+    if not all(low < high for low, high in zip(worst, best, strict=True)):
+        raise ValueError(f"concave has the worst value of each objective first, then better ones: {options['concave']}")
+    return partial(concave_utility, worst=worst, best=best)
+
+
+def _weights(listed: str, name: str, count: int | None) -> list[float]:
+    """Return weights that sum to one."""
+    weights = _numbers(listed, name, count)
     if min(weights) < 0:
-        raise ValueError(f"weights must not be negative: {listed}")
+        raise ValueError(f"{name} must not be negative: {listed}")
     total = sum(weights)
     if not 0 < total < math.inf:
-        raise ValueError(f"weights must have a finite sum above zero: {listed}")
-    weights = [weight / total for weight in weights]
-    if not chebyshev:
-        return partial(UtilityUser, linear_utility(weights))
-    if not utopian:
-        return partial(UtilityUser, chebyshev_utility(weights), comparable=False)
-    point = _numbers(utopian.removeprefix("="), "chebyshev", len(weights))
-    return partial(UtilityUser, chebyshev_utility(weights, point))
+        raise ValueError(f"{name} must have a finite sum above zero: {listed}")
+    return [weight / total for weight in weights]
+
+
+def _limits(listed: str, count: int) -> list[float]:
+    """Return limits, -inf for each `none`."""
+    words = [word.strip() for word in listed.split(",")]
+    numbers = iter(_numbers(",".join("0" if word == "none" else word for word in words), "limits", count))
+    return [-math.inf if word == "none" else number for word, number in zip(words, numbers, strict=True)]
+
+
+def _number(options: Mapping[str, str], name: str, most: float = math.inf) -> float:
+    """Return the number of an option; 0 without it."""
+    if name not in options:
+        return 0.0
+    [number] = _numbers(options[name], name, 1)
+    if not 0 <= number <= most:
+        allowed = "at least 0" if most == math.inf else f"from 0 to {most:g}"
+        raise ValueError(f"{name} must be {allowed}, not {number:g}")
+    return number
 
 
 def _target_user(value: str, objectives: int | None) -> Callable[[], DecisionMaker]:

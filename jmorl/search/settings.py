@@ -24,7 +24,7 @@ class SearchConfig(Section):
         description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
     )
     outside_share: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0,
+        0.17,
         description="interactive: share of the tasks outside the bounds while the choice stays; 0: none (the paper)",
     )
     gain_within: Literal["bounds", "front"] = Field(

@@ -26,6 +26,10 @@ VALUES = np.array([[3.0, 1.0], [2.0, 2.5], [0.0, 9.0]])
         ("weights=0, 2.0", [1, 2.5, 9]),
         ("weights=1,1,chebyshev=4,10", [-4.5, -3.75, -2]),
         ("weights=0,1,chebyshev=4,10", [-9, -7.5, -1]),
+        ("weights=1,0,concave=0,0,3,9", [np.log(6), np.log(1 + 10 / 3), 0]),
+        ("weights=1,0,limits=none,2", [3 - 1000, 2, 0]),
+        ("A,random=0.2", [2, 2.25, 4.5]),
+        ("weights=3,1,before=0,1,until=4", [2.5, 2.125, 2.25]),
     ],
 )
 def test_users_with_a_utility(objectives_of, spec, utilities):
@@ -42,6 +46,40 @@ def test_chebyshev_without_a_utopian_point_reports_no_utility(ask, objectives_of
     assert user.utility(VALUES) is None
     # Distances to the ideal (3, 9), halved: 4, 3.25, 1.5.
     assert user.answer(ask(VALUES)).policy == 12
+
+
+def test_one_answer_in_five_is_any_and_the_same_question_has_the_same_answer(ask, objectives_of):
+    user = make_user("weights=1,0,random=0.2", objectives_of(2))
+    generator = np.random.default_rng(0)
+    questions = [ask(generator.normal(size=(10, 2)), generation=3) for _ in range(500)]
+    answers = [user.answer(question).policy for question in questions]
+    assert answers == [user.answer(question).policy for question in questions]
+    wrong = [answer != 10 + each.values[:, 0].argmax() for answer, each in zip(answers, questions, strict=True)]
+    assert 0.13 < np.mean(wrong) < 0.24  # nine in ten of a fifth
+
+
+def test_small_differences_are_mistaken_more_often(ask, objectives_of):
+    user = make_user("weights=1,0,temperature=0.05", objectives_of(2))
+    generator = np.random.default_rng(0)
+
+    def mistakes(behind: float) -> float:
+        fronts = [np.array([[1.0, each], [1 - behind, 0.0], [0.0, 0.0]]) for each in generator.normal(size=300)]
+        return float(np.mean([user.answer(ask(front)).policy != 10 for front in fronts]))
+
+    # Bradley and Terry: 1 / (1 + exp(difference / temperature)).
+    assert mistakes(0.05) == pytest.approx(1 / (1 + np.e), abs=0.08)
+    assert mistakes(0.5) < 0.01
+
+
+def test_a_mind_may_change(ask, objectives_of):
+    user = make_user("weights=0,1,before=1,0,until=4", objectives_of(2))
+    assert [user.answer(ask(VALUES, generation=each)).policy for each in (1, 3, 4, 9)] == [10, 10, 12, 12]
+
+
+def test_limits_are_told_and_kept_to(ask, objectives_of):
+    user = make_user("weights=1,0,limits=none,2", objectives_of(2))
+    answer = user.answer(ask(VALUES))
+    assert answer.policy == 11 and answer.limits == (-np.inf, 2.0)
 
 
 def test_targets(objectives_of):
@@ -86,9 +124,22 @@ def test_without_a_known_number_of_objectives_any_number_passes(spec):
         ("weights=0,0", None, "weights must have a finite sum above zero: 0,0"),
         ("weights=1e308,1e308", None, "weights must have a finite sum above zero"),
         ("weights=1,2,euclid", 2, "but 'euclid' is none"),
-        ("weights=1,2,chebyshevy", 2, "chebyshev must be numbers separated by commas, but 'y' is none"),
+        ("weights=1,2,chebyshevy", 2, "weights must be numbers separated by commas, but 'chebyshevy' is none"),
         ("weights=1,2,chebyshev=", 2, "chebyshev must be numbers"),
         ("weights=1,2,chebyshev=1", None, "chebyshev must have one number for each of 2 objectives, not 1: 1"),
+        ("weights=1,2,concave", 2, "concave has no value; write concave=WORST1,"),
+        ("weights=1,2,concave=1,2", 2, "concave must have one number for each of 4 objectives"),
+        ("weights=1,2,concave=1,2,0,3", 2, "concave has the worst value of each objective first, then better ones"),
+        ("weights=1,2,concave=1,2,3,4,chebyshev", 2, "either chebyshev or concave"),
+        ("weights=1,2,limits=3", 2, "limits must have one number for each of 2 objectives, not 1"),
+        ("weights=1,2,limits=3,nothing", 2, "limits must be numbers separated by commas, but 'nothing' is none"),
+        ("A,random=2", 2, "random must be from 0 to 1, not 2"),
+        ("A,temperature=-1", 2, "temperature must be at least 0, not -1"),
+        ("A,before=1,2", 2, "needs before=W1,W2,... and until=GENERATION"),
+        ("A,until=3", 2, "needs before=W1,W2,... and until=GENERATION"),
+        ("A,before=1,2,until=2.5", 2, "a whole number"),
+        ("A,randon=0.2", 2, "a user has no option 'randon'; .*; did you mean 'random'"),
+        ("A,random=0.2,random=0.3", 2, "random is given twice"),
         ("target=1,2,3", 2, "target must have one number for each of 2 objectives, not 3: 1,2,3"),
         ("target=1,nan", 2, "target must be finite numbers, but 'nan' is not"),
         ("target=1,", None, "target must be numbers separated by commas, but '' is none"),
