@@ -92,6 +92,7 @@ def parser() -> argparse.ArgumentParser:
     show.add_argument("run", type=to_path, metavar="RUN", help="run folder")
 
     _add_paper(commands)
+    _add_study(commands)
 
     commands.add_parser("envs", help="list the environments")
     return whole
@@ -130,6 +131,19 @@ def _add_paper(commands: Any) -> None:
     paper.add_argument("--report", action="store_true", help="make no runs, only the report of those there are")
     paper.add_argument("--out", type=to_path, metavar="FOLDER", help="default: benchmarks/paper, or runs/paper-quick")
     paper.add_argument("--work", type=to_path, metavar="FOLDER", help="run folders (default: runs/paper, or OUT/work)")
+
+
+def _add_study(commands: Any) -> None:
+    study = commands.add_parser(
+        "study",
+        help="compare what users get from methods, and what they are asked",
+        description="The plan says which users, methods and seeds; see benchmarks/study/plan.toml. Runs that are done "
+        "are skipped, one that was interrupted goes on, and the report is about the runs there are.",
+    )
+    study.add_argument("plan", type=to_path, metavar="PLAN", help="a TOML file")
+    study.add_argument("--report", action="store_true", help="make no runs, only the report of those there are")
+    study.add_argument("--out", type=to_path, metavar="FOLDER", help="report and records (default: the plan's folder)")
+    study.add_argument("--work", type=to_path, metavar="FOLDER", help="run folders (default: runs/study)")
 
 
 def _add_studio(commands: Any) -> None:

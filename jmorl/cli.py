@@ -378,6 +378,12 @@ def _paper(options: argparse.Namespace) -> None:
     make_paper(options.only, units, options.seeds, options.quick, run, out, work, options.together)
 
 
+def _study(options: argparse.Namespace) -> None:
+    from jmorl.experiments.study.command import make_study
+
+    make_study(options.plan, not options.report, options.out, options.work)
+
+
 def _envs(options: argparse.Namespace) -> None:
     from jmorl.display.console import PlainConsole
     from jmorl.report.tables import environments_table
@@ -396,10 +402,11 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "export": _export,
     "enautilus": _enautilus,
     "paper": _paper,
+    "study": _study,
     "envs": _envs,
 }
 
-COMPUTING = ("train", "resume", "branch", "studio", "evaluate", "play", "paper")  # these need JAX's devices
+COMPUTING = ("train", "resume", "branch", "studio", "evaluate", "play", "paper", "study")  # these need JAX's devices
 
 
 if __name__ == "__main__":

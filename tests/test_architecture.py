@@ -62,8 +62,8 @@ MAY_IMPORT = {
         "jmorl.units",
     },
     "jmorl.experiments": {
-        *("envs", "jmorl.config", "jmorl.decision", "jmorl.events", "jmorl.learning", "jmorl.loop", "jmorl.search"),
-        "jmorl.storage",
+        *("envs", "jax", "jmorl.config", "jmorl.confirmation", "jmorl.decision", "jmorl.display", "jmorl.events"),
+        *("jmorl.learning", "jmorl.loop", "jmorl.report", "jmorl.search", "jmorl.signals", "jmorl.storage"),
     },
     "jmorl.paper": {
         *("envs", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.experiments"),

@@ -1,6 +1,5 @@
 """A comparison of contenders, one's own methods and users among them: the steps that each needs to targets."""
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +14,10 @@ from jmorl.decision.protocol import Answer, DecisionMaker, Question
 from jmorl.decision.target import TargetUser
 from jmorl.experiments import tables
 from jmorl.experiments.cells import Cell, Places, distinct, known, missing
+from jmorl.experiments.naming import is_name
 from jmorl.experiments.runner import make
 from jmorl.experiments.targets import TargetRow, target_row
 from jmorl.storage.files import write_text
-
-NAME = re.compile(r"\w[\w .+=-]*")  # of contenders and targets
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ def _problems(
             yield f"there is no {what} to compare with"
     for what, names in (("contender", contenders), ("target", targets)):
         for name in names:
-            if not NAME.fullmatch(name):
+            if not is_name(name):
                 yield f"{what} {name!r}: files are named after it; write it with letters, digits, spaces and . _ + = -"
     for seed, count in Counter(seeds).items():
         if count > 1:

@@ -58,7 +58,7 @@ class Waiting:
 def waiting(records: Sequence[RunRecord]) -> Waiting:
     """Sum up what at least one run asked of a person."""
     return Waiting(
-        float(np.mean([len(record.questions) for record in records])),
+        float(np.mean([len(record.asked) for record in records])),
         float(np.mean([_before_first(record) for record in records])),
         float(np.median([wait for record in records for wait in _between(record)] or [np.nan])),
     )
@@ -66,13 +66,13 @@ def waiting(records: Sequence[RunRecord]) -> Waiting:
 
 def _before_first(record: RunRecord) -> float:
     """Return the seconds before the first question: one before generation g comes when the generation before ends."""
-    if not record.questions:
+    if not record.asked:
         return record.total_seconds
-    return float(record.seconds[record.questions[0].generation - 1])
+    return float(record.seconds[record.asked[0].generation - 1])
 
 
 def _between(record: RunRecord) -> list[float]:
     """Return the seconds between each question and the next."""
-    asked = [question.generation for question in record.questions]
+    asked = [question.generation for question in record.asked]
     ends = record.seconds
     return [float(ends[after - 1] - ends[before - 1]) for before, after in zip(asked, asked[1:], strict=False)]

@@ -65,6 +65,7 @@ class PolicyRecord:
     predicted: tuple[float, ...] | None  # [M]
     raw: tuple[float, ...]  # [M] mean undiscounted return, whatever the run's units
     discounted: tuple[float, ...] | None = None  # [M] mean discounted raw return; in paper units only
+    interval: tuple[tuple[float, ...], tuple[float, ...]] | None = None  # [2, M] of the prediction
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,25 @@ class QuestionRecord:
     generation: int  # the one about to start
     shown: int  # how many policies
     chosen: int  # id
+    stand_in: bool = False  # a stand-in answered, and nobody was asked
+
+
+@dataclass(frozen=True)
+class ConfirmedScore:
+    """The score of the result on fresh starts, as the run reported it."""
+
+    episodes: int
+    values: tuple[float, ...]  # [M]
+    error: tuple[float, ...]  # [M] as stated
+
+
+@dataclass(frozen=True)
+class FreshScore:
+    """The score of the result on many more episodes, found after the run."""
+
+    episodes: int
+    values: tuple[float, ...]  # [M]
+    error: tuple[float, ...]  # [M]
 
 
 @dataclass(frozen=True)
@@ -92,6 +112,8 @@ class RunRecord:
     policies: tuple[PolicyRecord, ...]
     format: int = FORMAT
     fault: str | None = None  # why it broke down
+    confirmed: ConfirmedScore | None = None
+    fresh: FreshScore | None = None
     together: tuple[str, ...] = ()  # keys of the cells made in one program, if with others; its times are theirs, too
 
     @cached_property
@@ -122,6 +144,11 @@ class RunRecord:
         """
         taken = np.cumsum([generation.seconds for generation in self.generations])
         return np.full_like(taken, np.nan) if self.together else taken
+
+    @property
+    def asked(self) -> list[QuestionRecord]:
+        """The questions that somebody was asked: not those that a stand-in answered."""
+        return [question for question in self.questions if not question.stand_in]
 
     @property
     def total_steps(self) -> int:
@@ -201,11 +228,12 @@ def _record(run: StoredRun, reason: str, chosen: int | None, fault: str | None =
             None if policy.predicted is None else _vector(policy.predicted),
             _vector(policy.values if policy.raw is None else policy.raw),
             None if policy.raw is None else _vector(policy.discounted),
+            None if policy.interval is None else (_vector(policy.interval[0]), _vector(policy.interval[1])),
         )
         for policy in run.policies
     )
     questions = tuple(
-        QuestionRecord(record.generation, len(record.shown), record.policy)
+        QuestionRecord(record.generation, len(record.shown), record.policy, record.stand_in)
         for record in run.decisions
         if isinstance(record, DecisionRecord)
     )
@@ -221,7 +249,15 @@ def _record(run: StoredRun, reason: str, chosen: int | None, fault: str | None =
         questions=questions,
         policies=policies,
         fault=fault,
+        confirmed=_confirmed(run),
     )
+
+
+def _confirmed(run: StoredRun) -> ConfirmedScore | None:
+    found = run.chosen.confirmation if run.chosen else None
+    if run.chosen is None or found is None:
+        return None
+    return ConfirmedScore(found.episodes, _vector(run.chosen.values), _vector(found.error))
 
 
 def memberships(run: StoredRun) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:

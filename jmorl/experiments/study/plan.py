@@ -1,0 +1,167 @@
+"""The plan of a study, a TOML file: users, methods and seeds, and the runs that they make.
+
+    seeds = [1, 2, 3]
+
+    [methods]                      # settings of each contender
+    interactive = {}
+    PGMORL = { method = "pgmorl" }
+
+    [[parts]]                      # all of one environment and budget; `methods` are all, or those named
+    name = "mountaincar"
+    env = "mo-mountaincarcontinuous-v0"
+    steps = 2_500_000
+    best = "../exact_front.json"   # optional: a file of the best there is; else it is the best of all runs
+    users = { A = "A", "almost A" = "A,random=0.2", "a target" = "target=-60,-50" }
+
+A method that asks nobody before its end makes one run for all users of a part.
+"""
+
+import json
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+import envs
+from jmorl.config import Config, ConfigError, resolve
+from jmorl.decision.protocol import DecisionMaker
+from jmorl.decision.target import TargetUser
+from jmorl.decision.users import make_user
+from jmorl.experiments.cells import Cell
+from jmorl.experiments.naming import is_name
+from jmorl.experiments.record import RunRecord, read_record
+from jmorl.loop import make_method
+
+EVERYBODY = "everybody"  # whose run it is that serves all users
+
+
+@dataclass(frozen=True)
+class StudyPart:
+    """The runs in one environment, with one budget."""
+
+    name: str
+    env: str
+    steps: int
+    users: dict[str, str]  # name -> as `--user` takes it
+    methods: tuple[str, ...] = ()  # of the study's; empty: all
+    best: str | None = None  # a file with vectors that are the best there is
+
+
+@dataclass(frozen=True)
+class Study:
+    """Users, methods and seeds."""
+
+    seeds: tuple[int, ...]
+    methods: dict[str, dict[str, Any]]  # name -> settings
+    parts: tuple[StudyPart, ...]
+    records: tuple[str, ...] = ()  # folders with records of other comparisons that are taken where they fit
+    folder: Path = Path()  # of the plan, to which all paths in it are relative
+
+    def methods_of(self, part: StudyPart) -> tuple[str, ...]:
+        """Return the names of a part's methods, in the order of the study."""
+        return tuple(name for name in self.methods if not part.methods or name in part.methods)
+
+    def config(self, part: StudyPart, method: str, user: str | None, seed: int) -> Config:
+        """Return the settings of a run; without a user, of one whom any result will do. Raises ConfigError."""
+        objectives = len(envs.make(part.env).objectives)
+        nobody = "A" if objectives == 2 else f"weights={','.join('1' * objectives)}"
+        given = {"env": part.env, "user": part.users[user] if user else nobody, "seed": seed, "steps": part.steps}
+        return resolve(overrides={**self.methods[method], **given, "checkpoints": {"keep": 2}})
+
+    def cell(self, part: StudyPart, method: str, user: str, seed: int) -> Cell:
+        """Return the run of a method for a user; for one that asks nobody, the run for everybody."""
+        if not self.asks(part, method):
+            return Cell(file_name(part.name, method, EVERYBODY, f"seed {seed}"), self.config(part, method, None, seed))
+        return Cell(file_name(part.name, method, user, f"seed {seed}"), self.config(part, method, user, seed))
+
+    def cells(self, part: StudyPart) -> list[Cell]:
+        """Return the runs of a part: seed by seed, so that what there is of a study is about all of it."""
+        return [
+            self.cell(part, method, user, seed)
+            for seed, user, method in product(self.seeds, part.users, self.methods_of(part))
+        ]
+
+    def asks(self, part: StudyPart, method: str) -> bool:
+        """Return whether a method asks anybody before its end."""
+        config = self.config(part, method, None, self.seeds[0])
+        found = make_method(config, envs.make(part.env))
+        return found.generations_to_question(found.initial_state()) is not None
+
+    def user(self, part: StudyPart, user: str) -> DecisionMaker:
+        """Return a user, to judge what came out."""
+        return make_user(part.users[user], envs.make(part.env).objectives)
+
+    def made_elsewhere(self, cells: Sequence[Cell]) -> dict[str, RunRecord]:
+        """Return the records of other comparisons that are of these runs, by the cell's key. Raises RecordError."""
+        paths = [path for folder in self.records for path in sorted((self.folder / folder).glob("*.json"))]
+        there = [read_record(path) for path in paths]
+        return {cell.key: record for cell in cells for record in there if cell.config.is_identified_by(record.digest)}
+
+    def exact(self, part: StudyPart) -> np.ndarray | None:
+        """Return the vectors [N, M] that are the best there is, if the plan names a file of them."""
+        if part.best is None:
+            return None
+        names = [objective.name for objective in envs.make(part.env).objectives]
+        front = json.loads((self.folder / part.best).read_text(encoding="utf-8"))["front"]
+        return np.array([[point[name] for name in names] for point in front])
+
+
+_STUDY: TypeAdapter[Study] = TypeAdapter(Study)
+
+
+def read_plan(path: Path) -> Study:
+    """Read a plan. Raises ConfigError with all that is wrong, before any run is made."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ConfigError([f"{path} cannot be read: {error}"]) from None
+    try:
+        study = _STUDY.validate_python({**content, "folder": path.parent})
+    except ValidationError as error:
+        wrong = [f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors()]
+        raise ConfigError([f"{path}: {each}" for each in wrong]) from None
+    problems = list(dict.fromkeys(_problems(study)))
+    if problems:
+        raise ConfigError([f"{path}: {problem}" for problem in problems])
+    return study
+
+
+def _problems(study: Study) -> Iterator[str]:
+    for what, given in (("seed", study.seeds), ("method", study.methods), ("part", study.parts)):
+        if not given:
+            yield f"there is no {what}"
+    if len(set(study.seeds)) < len(study.seeds):
+        yield "a seed is given twice"
+    if len({part.name for part in study.parts}) < len(study.parts):
+        yield "two parts have one name"
+    users = [user for part in study.parts for user in part.users]
+    for name in (*study.methods, *(part.name for part in study.parts), *users):
+        if not is_name(name):
+            yield f"{name!r}: files are named after it; write it with letters, digits and spaces"
+    for part in study.parts:
+        if not part.users:
+            yield f"part {part.name} has no users"
+        for method in (each for each in part.methods if each not in study.methods):
+            yield f"part {part.name}: there is no method {method!r}; there are {', '.join(study.methods)}"
+        for method, user, seed in product(study.methods_of(part), part.users, study.seeds[:1]):
+            try:
+                study.config(part, method, user, seed)
+                judge = study.user(part, user)
+            except (ConfigError, ValueError) as error:
+                yield f"part {part.name}, {method}, {user}: {error}"
+                continue
+            objectives = len(envs.make(part.env).objectives)
+            if not isinstance(judge, TargetUser) and judge.utility(np.zeros((1, objectives))) is None:
+                yield f"part {part.name}: {user} has no utility by which runs could be compared: {part.users[user]}"
+        if part.best is not None and not (study.folder / part.best).is_file():
+            yield f"part {part.name}: there is no file {study.folder / part.best}"
+
+
+def file_name(*parts: str) -> str:
+    """Return a name for files, without spaces."""
+    return "-".join(parts).replace(" ", "_")
