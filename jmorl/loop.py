@@ -191,11 +191,12 @@ class _Run:
 
     def _decided(self, state: RunState, question: AnyQuestion) -> Generator[Decided, None, tuple[RunState, Decided]]:
         """Put a question to the decision maker, and what may follow from the answer. Yields an event for each."""
+        earlier = state.search
         state, decided = self.ask(state, question)
         yield decided
         further = self.decision_maker.follow_up(decided.question, decided.answer)
         if further:
-            state, decided = self.ask(state, further)
+            state, decided = self.ask(replace(state, search=earlier), further)
             yield decided
         return state, decided
 

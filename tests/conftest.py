@@ -6,6 +6,7 @@ import pytest
 
 from jmorl.config import Config
 from jmorl.learning.devices import use_all_cpu_cores
+from jmorl.presets import PAPER_RULE, merged
 from tests.registered import ThreeWays
 from tests.resuming import train
 
@@ -21,16 +22,17 @@ hypothesis.settings.load_profile("jmorl")
 
 @pytest.fixture(scope="session")
 def small_config():
-    """A run of seconds with three objectives: a warm-up and three generations."""
-    return Config(
-        env=ThreeWays.id,
-        user="weights=0.5,0.3,0.2",
-        population={"agents": 4, "warmup_iterations": 2, "iterations": 3},
-        ppo={"environments": 3, "rollout_steps": 16, "minibatches": 4, "epochs": 2},
-        evaluation={"episodes": 2},
-        search={"weight_divisions": 4},
-        steps=4 * 3 * 16 * 11,
-    )
+    """A run of seconds with three objectives: a warm-up and three generations, with a question before each."""
+    sizes = {
+        "env": ThreeWays.id,
+        "user": "weights=0.5,0.3,0.2",
+        "population": {"agents": 4, "warmup_iterations": 2, "iterations": 3},
+        "ppo": {"environments": 3, "rollout_steps": 16, "minibatches": 4, "epochs": 2},
+        "evaluation": {"episodes": 2},
+        "search": {"weight_divisions": 4},
+        "steps": 4 * 3 * 16 * 11,
+    }
+    return Config.model_validate(merged(PAPER_RULE, sizes))
 
 
 @pytest.fixture(scope="module")

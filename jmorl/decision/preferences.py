@@ -24,6 +24,8 @@ RANDOM_SHARES = (0.02, 0.25)  # of answers
 CHANGE_OF_MIND = 0.01  # how likely it is in a generation
 AUGMENTATION = 0.05  # weight of the mean in utilities that look at the worst objective
 LINEAR, CHEBYSHEV, ASPIRATION = range(3)
+LEADING = 1e-6  # weight of the mean utility among policies whose comparison tells equally much
+WITHIN_LIMITS = 0.01  # weight of the utility of what misses the limits, against how much it misses
 DRAWS_OF_A_PAIR = 8  # from the posterior, until two differ
 KINDS = (LINEAR, LINEAR, CHEBYSHEV, ASPIRATION)  # in turn, of the particles
 
@@ -69,7 +71,7 @@ class PreferenceModel:
     def utilities(self, values: np.ndarray) -> np.ndarray:
         """Return what vectors [N, M] are worth to each particle [S, N]; the front's worst is 0, its best 1.
 
-        Of those that reach the limits, if there are any; one that does not is worth less than 0.
+        One that does not reach the limits is worth less than 0, and the less, the more is missing.
         """
         found, of_front = (
             _utilities(self._kinds, self._parameters, self.scale.apply(each)) for each in (values, self.front)
@@ -77,7 +79,8 @@ class PreferenceModel:
         least, span = _range(of_front)
         missing = np.maximum(self._limits - values, 0.0) / self.scale.span  # [N, M]
         far = missing.sum(axis=1)
-        return (found - least[:, None]) / span[:, None] - np.where(far > 0, 1 + far, 0.0)
+        scaled = (found - least[:, None]) / span[:, None]
+        return np.where(far > 0, WITHIN_LIMITS * scaled - 1 - far, scaled)
 
     def verdict(self) -> Verdict:
         """Return which member of the front is best by expectation."""
@@ -95,7 +98,7 @@ class PreferenceModel:
         rows = list(dict.fromkeys(always))
         while len(rows) < min(count, len(self.front)):
             best = utilities[:, rows].max(axis=1, keepdims=True, initial=-np.inf)
-            gains = np.maximum(utilities, best).mean(axis=0)
+            gains = np.maximum(utilities, best).mean(axis=0) + LEADING * utilities.mean(axis=0)
             gains[rows] = -np.inf
             rows.append(int(gains.argmax()))
         return sorted(rows)
@@ -120,7 +123,7 @@ def _posterior(
     generator: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return kinds [S] and parameters [S, M] of utilities drawn from the posterior."""
-    kinds = np.resize(KINDS, DRAWN)
+    kinds = generator.permutation(np.resize(KINDS, DRAWN))  # in no order, or resampling in equal steps would drop some
     parameters = _prior(generator, kinds, front.shape[1])
     ends = scale.apply(front)
     scaled = [(scale.apply(answer.shown), answer.ranking) for answer in answers]
@@ -193,14 +196,16 @@ def _log_likelihoods(
         utilities = _utilities(kinds, parameters, shown)  # [S, K]
         behind = (utilities.max(axis=1, keepdims=True) - utilities) / span[:, None]
         for number, temperature in enumerate(TEMPERATURES):
-            odds = np.exp(behind / np.float32(-temperature))
             left = np.ones(len(shown), bool)
             for place in ranking[: len(shown) - 1]:
-                probability = odds[:, place] / np.maximum(odds[:, left].sum(axis=1), np.float32(1e-30))
+                nearest = behind[:, left].min(axis=1, keepdims=True)  # or the odds of all that are left may vanish
+                odds = np.exp(np.maximum(behind - nearest, 0) / np.float32(-temperature))
+                probability = odds[:, place] / odds[:, left].sum(axis=1)
                 answer[number] += np.log((1 - shares) * probability + shares / left.sum())
                 left[place] = False
             if not ranking:
                 alike = np.exp(-behind.mean(axis=1) / np.float32(temperature))  # geometric mean of the odds
+                odds = np.exp(behind / np.float32(-temperature))
                 probability = alike / (odds.mean(axis=1) + alike)
                 answer[number] += np.log((1 - shares) * probability + shares / (len(shown) + 1))
     return found.reshape(len(answers), len(TEMPERATURES) * len(RANDOM_SHARES), len(kinds))

@@ -173,7 +173,7 @@ class Answer:
     limits: tuple[float, ...] | None = None  # [M] what each objective must reach, -inf: anything; None: as before
 
     def __post_init__(self) -> None:
-        ranking = tuple(_id("ranking", each) for each in self.ranking)
+        ranking = tuple(_id("ranking", each) for each in _listed("ranking", self.ranking))
         if len(set(ranking)) < len(ranking):
             raise AnswerError(f"a policy is twice in the ranking {list(ranking)}")
         if ranking and self.equal:
@@ -184,7 +184,7 @@ class Answer:
             ("stop", _truth("stop", self.stop)),
             ("equal", _truth("equal", self.equal)),
             ("ranking", ranking),
-            ("limits", None if self.limits is None else tuple(_limit(each) for each in self.limits)),
+            ("limits", None if self.limits is None else tuple(map(_limit, _listed("limits", self.limits)))),
         ):
             object.__setattr__(self, name, value)
 
@@ -390,6 +390,13 @@ class DecisionMaker(ABC):
 def _id(name: str, value: Any) -> int:
     """Return the id that a policy has, or that a value is. Raise AnswerError."""
     return value.id if isinstance(value, Policy) else _whole(name, value, 0)
+
+
+def _listed(name: str, value: Any) -> Sequence[Any]:
+    """Return a sequence, which no text is. Raise AnswerError if it is none."""
+    if isinstance(value, (str, bytes)) or not hasattr(value, "__len__") or not hasattr(value, "__iter__"):
+        raise AnswerError(f"{name} must be a list, not {_shortly(value)}")
+    return list(value)
 
 
 def _truth(name: str, value: Any) -> bool:

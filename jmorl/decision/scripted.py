@@ -71,6 +71,18 @@ class ScriptedUser(DecisionMaker):
         stop = record.stop or (question.purpose == "steer" and not steering)
         return replace(record.answer, policy=policies[index].id, stop=stop, ranking=self._ranked(record, policies))
 
+    def follow_up(self, question: AnyQuestion, answer: Any) -> AnyQuestion | None:
+        """Return the second question about a choice, if the log has one."""
+        if not isinstance(question, Question) or question.again:
+            return None
+        record = (self._steering if question.purpose == "steer" else self._final).get((question.generation, 1))
+        if record is None:
+            return None
+        policies = question.whole.front
+        rows = [self._find(each.policy, each.values, policies, question.generation) for each in record.shown]
+        others = tuple(policy for row, policy in enumerate(policies) if row not in rows)
+        return replace(question.whole, front=tuple(policies[row] for row in rows), others=others, again=True)
+
     def choose_point(self, question: PointQuestion) -> PointAnswer:
         """Return the answer to a question of E-NAUTILUS."""
         record = self._points.get((question.generation, question.number))
@@ -87,6 +99,8 @@ class ScriptedUser(DecisionMaker):
     def _ranked(self, record: DecisionRecord, policies: tuple[Policy, ...]) -> tuple[int, ...]:
         """Return the record's ranking, by the ids that the policies have here."""
         values = {shown.policy: shown.values for shown in record.shown}
+        if not values.keys() >= set(record.ranking):
+            raise ScriptError(f"{self.path} ranks policies at generation {record.generation} that it does not show")
         found = [self._find(each, values[each], policies, record.generation) for each in record.ranking]
         return tuple(policies[index].id for index in found)
 

@@ -78,19 +78,21 @@ class StandIn(Wrapper):
         self.limits = answer.limits or self.limits
         said = _said(decision_record(asked, asked.checked(answer)))
         self.answers += [said] if said else []
-        if answer.equal or (asked.form == "pair" and answer.ranking and not answer.stop):
+        if not answer.stop and (answer.equal or (asked.form == "pair" and answer.ranking)):
             whole = asked.whole
             answer = replace(answer, policy=whole.front[self._model(whole).verdict().best].id)
         return asked, answer
 
-    def follow_up(self, question: AnyQuestion, answer: Any) -> Question | None:
+    def follow_up(self, question: AnyQuestion, answer: Any) -> AnyQuestion | None:
         """Return the question whether an answer was meant so, where the user's other answers speak for another policy.
 
         Whoever says so twice is believed.
         """
+        if self.ask != "unsure":
+            return super().follow_up(question, answer)
         if not isinstance(question, Question) or not question.was_asked(answer) or question.again or answer.stop:
             return None
-        if question.purpose not in TRUSTED_REGRET or question.form != "best" or self.ask != "unsure":
+        if question.purpose not in TRUSTED_REGRET or question.form != "best":
             return None
         whole = question.whole
         model = self._model(whole)
@@ -100,7 +102,7 @@ class StandIn(Wrapper):
         if expected[best] - expected[chosen] < DOUBTED_REGRET:
             return None
         pair = whole.front[best], whole.front[chosen]
-        return replace(whole, front=pair, others=_without(whole.front, pair), again=True)
+        return replace(whole, front=pair, others=_without(whole.front, pair), again=True, limits=self.limits)
 
     def _model(self, question: Question) -> PreferenceModel:
         """Return the posterior by now."""
@@ -122,7 +124,7 @@ class StandIn(Wrapper):
             previous = [ids.index(question.previous)] if question.previous in ids else []
             rows = model.telling(FEW, [verdict.best, *previous])
         few = tuple(question.front[row] for row in rows)
-        return replace(question, front=few, others=_without(question.front, few), form=FORMS[self.shows])
+        return replace(question, front=few, others=_without(question.whole.front, few), form=FORMS[self.shows])
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""

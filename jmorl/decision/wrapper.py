@@ -17,6 +17,10 @@ class Wrapper(DecisionMaker):
         """Return the answer to a question of any kind."""
         return self.user.respond(question)
 
+    def follow_up(self, question: AnyQuestion, answer: Any) -> AnyQuestion | None:
+        """Return the user's further question about an answer."""
+        return self.user.follow_up(question, answer)
+
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
         answer: Answer = self.respond(question)

@@ -58,7 +58,7 @@ class Interactive(PGMORL):
     def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> PGMORLState:
         """Return the state with the bounds that follow from the choice."""
         assert run.choice is not None and isinstance(question, Question), "the question is about policies"
-        limits = answer.limits or run.search.limits
+        limits = answer.limits or question.limits
         state = replace(run.search, silent_generations=answer.generations, limits=limits)
         if run.choice.id != question.previous:
             state = replace(state, generations_with_choice=0)

@@ -37,7 +37,8 @@ def widened_bounds(
 ) -> Bounds:
     """Return `lower_bounds`, their slack doubled until so many of the vectors reach them, 7 times at most.
 
-    Where the preferred values reach a limit, the bound stays above it but for the slack before it was doubled.
+    Where there is a limit, the bound stays above it, or above the preferred value if that is less, but for the slack
+    before it was doubled.
     """
     slack = np.maximum(delta * np.sqrt(unit * np.abs(preferred)), least_slack)
     for widenings in range(MOST_WIDENINGS + 1):

@@ -1,13 +1,14 @@
 """Answers are checked and converted where they are given, with one sentence for what is none."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from envs import Objective
 from jmorl.decision.protocol import Answer, AnswerError, Back, Choose, PairQuestion, Question, WeightQuestion
-from jmorl.decision.records import from_json, read_log, record_of, to_json
+from jmorl.decision.records import ScriptError, from_json, read_log, record_of, to_json
 from jmorl.search.policy import Policy
 
 OBJECTIVES = (Objective("time", "time", "s"), Objective("fuel", "fuel", "l"))
@@ -32,12 +33,18 @@ WEIGHTS = WeightQuestion(1, OBJECTIVES, FRONT)
         (lambda: Answer(7.0, generations=2.0), Answer(7, generations=2)),
         (lambda: Answer(7, generations=np.int64(1)), Answer(7)),
         (lambda: Answer(7, stop=np.bool_(True)), Answer(7, stop=True)),
+        (lambda: Answer(7, ranking=[FRONT[1], np.int64(3)]), Answer(7, ranking=(7, 3))),
+        (lambda: Answer(7, ranking=np.array([7])), Answer(7, ranking=(7,))),
+        (lambda: Answer(7, equal=np.bool_(True)), Answer(7, equal=True)),
+        (lambda: Answer(7, limits=[None, np.float32(-5)]), Answer(7, limits=(-np.inf, -5.0))),
+        (lambda: Answer(7, limits=np.array([-np.inf, 2])), Answer(7, limits=(-np.inf, 2.0))),
     ],
 )
 def test_what_means_an_answer_becomes_one_in_its_proper_types(given, kept):
     answer = QUESTION.checked(given())
     assert answer == kept
     assert [type(each) for each in (answer.policy, answer.stop, answer.generations)] == [int, bool, int]
+    assert {int} >= set(map(type, answer.ranking)) and {float} >= set(map(type, answer.limits or ()))
     json.dumps(QUESTION.to_json(answer))
 
 
@@ -57,11 +64,30 @@ def test_what_means_an_answer_becomes_one_in_its_proper_types(given, kept):
         (lambda: 7, r"answer must return a jmorl.Answer\(policy id\), not 7"),
         (lambda: Answer(4), r"policy 4 is not among the policies shown: \[3, 7\]"),
         (lambda: Answer(policy(4, 0, 0)), r"policy 4 is not among the policies shown"),
+        (lambda: Answer(7, ranking=(7, 3, 7)), r"a policy is twice in the ranking \[7, 3, 7\]"),
+        (lambda: Answer(7, ranking=(FRONT[1], 7)), r"a policy is twice in the ranking \[7, 7\]"),
+        (lambda: Answer(7, ranking=(7, "3")), "ranking must be a whole number, not '3'"),
+        (lambda: Answer(7, ranking=(7, 3), equal=True), "no difference cannot be ranked"),
+        (lambda: Answer(7, ranking=(7, 4)), r"policy 4 is not among the policies shown: \[3, 7\]"),
+        (lambda: Answer(7, equal=1), "equal must be True or False, not 1"),
+        (lambda: Answer(7, limits=(float("nan"), 0)), "a limit must be a number, or -inf for none, not nan"),
+        (lambda: Answer(7, limits=(0, float("inf"))), "a limit must be a number, or -inf for none, not inf"),
+        (lambda: Answer(7, limits=(0, "high")), "a limit must be a number, or -inf for none, not 'high'"),
+        (lambda: Answer(7, limits=(0,)), r"limits must be 2 numbers, not \(0.0,\)"),
+        (lambda: Answer(7, limits=()), r"limits must be 2 numbers, not \(\)"),
     ],
 )
 def test_what_is_no_answer_is_refused_in_one_sentence(given, sentence):
     with pytest.raises(AnswerError, match=sentence):
         QUESTION.checked(given())
+
+
+def test_a_policy_that_is_not_shown_can_be_chosen_but_not_ranked():
+    short = replace(QUESTION, front=FRONT[:1], others=FRONT[1:])
+    assert short.checked(Answer(7)) == Answer(7)
+    with pytest.raises(AnswerError, match="policy 7 is not among the policies shown"):
+        short.checked(Answer(3, ranking=(3, 7)))
+    assert short.whole.checked(Answer(3, ranking=(3, 7))).ranking == (3, 7)
 
 
 @pytest.mark.parametrize(("given", "kept"), [(3, 3), (np.int64(7), 7), (FRONT[1], 7), (None, None)])
@@ -93,6 +119,64 @@ def test_an_answer_to_any_question_is_written_and_read_back(question, answer, tm
     log.write_text(to_json(record) + "\n", encoding="utf-8")
     assert read_log(log) == [record]
     assert question.from_json(question.to_json(answer)) == answer
+
+
+AGAIN = replace(QUESTION, again=True)
+SHOWN = '"shown": [{"policy": 3, "values": [-1.0, -5.0]}, {"policy": 7, "values": [-2.0, -4.0]}]'
+
+
+@pytest.mark.parametrize(
+    ("question", "answer", "fields"),
+    [
+        (QUESTION, Answer(7, ranking=(7, 3)), {"ranking": [7, 3]}),
+        (QUESTION, Answer(3, ranking=(7,)), {"ranking": [7]}),
+        (QUESTION, Answer(7, equal=True), {"equal": True}),
+        (QUESTION, Answer(7, limits=(-np.inf, -5)), {"limits": [None, -5.0]}),
+        (QUESTION, Answer(7, limits=(-np.inf, -np.inf)), {"limits": [None, None]}),
+        (AGAIN, Answer(7), {"again": True}),
+        (AGAIN, Answer(7, True, ranking=(7, 3), limits=(0, 1)), {"ranking": [7, 3], "limits": [0, 1], "again": True}),
+    ],
+)
+def test_more_than_a_preferred_policy_is_a_record_of_format_4(question, answer, fields):
+    record = record_of(question, answer)
+    line = to_json(record)
+    assert from_json(line) == record and record.answer == answer
+    later = {name: value for name, value in json.loads(line).items() if name in ("ranking", "equal", "limits", "again")}
+    assert json.loads(line)["format"] == 4 and later == fields
+
+
+@pytest.mark.parametrize(
+    ("answer", "line"),
+    [
+        (
+            Answer(7, generations=2),
+            '{"format": 1, "purpose": "steer", "generation": 1, "policy": 7, "values": [-2.0, -4.0], "stop": false, '
+            f'"generations": 2, {SHOWN}}}',
+        ),
+        (
+            Answer(7, stand_in=True),
+            '{"format": 3, "purpose": "steer", "generation": 1, "policy": 7, "values": [-2.0, -4.0], "stop": false, '
+            f'"generations": 1, {SHOWN}, "stand_in": true}}',
+        ),
+    ],
+)
+def test_a_preferred_policy_alone_is_written_as_ever(answer, line):
+    assert to_json(record_of(QUESTION, answer)) == line
+
+
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"ranking": [7, -1]}, "ranking.1: input should be greater than or equal to 0"),
+        ({"limits": [None, "5"]}, "limits.1.*: input should be a valid number"),
+        ({"equal": 1}, "equal: input should be a valid boolean"),
+        ({"again": "yes"}, "again: input should be a valid boolean"),
+    ],
+)
+def test_a_record_with_a_false_addition_is_refused(fields, problem):
+    line = json.dumps(json.loads(to_json(record_of(QUESTION, Answer(7)))) | {"format": 4} | fields)
+    with pytest.raises(ScriptError, match=f"is not a decision: {problem}"):
+        from_json(line)
 
 
 def test_points_are_checked_too():

@@ -1,6 +1,7 @@
 """The decision log and its replay: the same answers, or a sentence saying why not."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from jmorl.decision.records import (
 from jmorl.decision.scripted import ScriptedUser
 
 VALUES = [[-70, -40], [-66.25, -57], [-100, -20]]
+TEN = Answer(10)
 STEER = {"format": 1, "purpose": "steer", "generation": 1, "policy": 11, "values": [-66.25, -57]}
 POINT = {
     "format": 1,
@@ -59,7 +61,16 @@ def test_a_run_is_replayed_answer_by_answer(ask, replay):
     assert [user.answer(question) for question in reversed(questions)] == answers[::-1]
 
 
-@pytest.mark.parametrize("answer", [Answer(12, stop=True), Answer(12, generations=4)])
+@pytest.mark.parametrize(
+    "answer",
+    [
+        Answer(12, stop=True),
+        Answer(12, generations=4),
+        Answer(12, ranking=(12, 10)),
+        Answer(10, equal=True),
+        Answer(12, limits=(-90.0, -np.inf)),
+    ],
+)
 def test_everything_in_an_answer_survives(ask, replay, answer):
     question = ask(VALUES)
     assert replay(recorded(question, answer)).answer(question) == answer
@@ -127,6 +138,40 @@ def test_a_line_that_goes_back_replaces_what_followed(ask, replay):
         user.answer(ask(VALUES, generation=3))
 
 
+def test_both_answers_about_one_choice_are_replayed(ask, replay):
+    question = ask(VALUES, generation=2)
+    again = replace(question, front=question.front[1:], others=question.front[:1], again=True)
+    user = replay(recorded(question, Answer(12)), recorded(again, Answer(11)), recorded(ask(VALUES, generation=3), TEN))
+    assert [user.answer(each) for each in (question, again, question)] == [Answer(12), Answer(11), Answer(12)]
+    assert user.answer(ask(VALUES, generation=3)) == TEN
+
+
+@pytest.mark.parametrize("purpose", ["steer", "final"])
+def test_who_is_asked_again_without_a_second_answer_says_the_same(ask, replay, purpose):
+    question = ask(VALUES, purpose=purpose)
+    user = replay(recorded(question, Answer(12)))
+    assert user.answer(replace(question, again=True)) == user.answer(question) == Answer(12)
+
+
+def test_a_first_answer_that_was_given_anew_replaces_the_second_one_too(ask, replay):
+    question = ask(VALUES)
+    again = replace(question, again=True)
+    user = replay(recorded(question, Answer(12)), recorded(again, Answer(11)), recorded(question, TEN))
+    assert user.answer(again) == user.answer(question) == TEN
+
+
+def test_a_ranking_is_replayed_by_values_and_not_by_ids(ask, replay, front_of):
+    line = recorded(ask(VALUES), Answer(12, ranking=(12, 10, 11)))
+    other = replace(ask(VALUES), front=front_of([VALUES[2], VALUES[0], VALUES[1]]))
+    assert replay(line).answer(other) == Answer(10, ranking=(10, 11, 12))
+
+
+def test_a_ranking_of_policies_that_the_log_does_not_show_is_an_error_of_the_log(ask, replay):
+    """In a log written by hand, which may leave out what was shown."""
+    with pytest.raises(ScriptError):
+        replay(STEER | {"format": 4, "ranking": [11, 10]}).answer(ask(VALUES))
+
+
 def test_a_script_claims_no_utility_and_no_satisfaction(replay):
     user = replay(STEER)
     assert user.utility(np.array(VALUES)) is None and not user.satisfied(np.array(VALUES))
@@ -186,7 +231,7 @@ def without(fields: dict, name: str) -> dict:
     [
         ('{"format": 1, "purp', "is not valid JSON: .* at column"),
         ("[1, 2]", "is not a JSON object"),
-        (STEER | {"format": 4}, "has format 4, newer than the format 3 known here; use a newer jmorl"),
+        (STEER | {"format": 5}, "has format 5, newer than the format 4 known here; use a newer jmorl"),
         (STEER | {"format": 0}, "is not a decision: format: input should be 1"),
         (without(STEER, "purpose"), 'purpose: should be "steer", "final" or "enautilus"'),
         (STEER | {"purpose": "guess"}, 'purpose: should be "steer", "final" or "enautilus"'),

@@ -1,6 +1,7 @@
 """The stand-in: it asks where it is not sure, its answers are marked, and runs with it resume and replay exactly."""
 
 import shutil
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -174,7 +175,8 @@ def test_a_choice_from_the_others_is_remembered_and_replayed(small_config, tmp_p
     assert [event.chosen.id for event in replayed] == [record.policy for record in read_run(whole).decisions]
 
 
-def test_a_short_question_has_the_last_choice_and_is_spread_over_the_front(ask):
+@pytest.mark.parametrize("seed", range(4))
+def test_a_short_question_has_the_last_choice_and_is_spread_over_the_front(ask, seed):
     asked = []
 
     class First(DecisionMaker):
@@ -182,5 +184,324 @@ def test_a_short_question_has_the_last_choice_and_is_spread_over_the_front(ask):
             asked.append([policy.id for policy in question.front])
             return Answer(question.front[0].id)
 
-    StandIn(First(), 0, ask="always", shows="few").decide(ask([[k, 9 - k] for k in range(10)], previous=12))
+    StandIn(First(), seed, ask="always", shows="few").decide(ask([[k, 9 - k] for k in range(10)], previous=12))
     assert len(asked[0]) == 5 and 12 in asked[0] and min(asked[0]) <= 11 and max(asked[0]) >= 18
+
+
+# --- questions of other forms, and what somebody says besides ----------------------------------------------------
+
+
+class Says(DecisionMaker):
+    """Answers as a function of the question says, and keeps the questions."""
+
+    def __init__(self, says):
+        self.says = says
+        self.questions = []
+
+    def answer(self, question):
+        self.questions.append(question)
+        return self.says(question)
+
+
+def best_first(question, weights=(0.3, 0.7)):
+    """The ids of those shown, from the best down."""
+    order = np.argsort(-(question.values @ np.array(weights)), kind="stable")
+    return tuple(question.front[row].id for row in order)
+
+
+def chooses(question):
+    return Answer(best_first(question)[0])
+
+
+def ranks(question):
+    return Answer(best_first(question)[0], ranking=best_first(question))
+
+
+@pytest.fixture
+def growing(ask):
+    """Questions of so many generations about a front that grows; a policy keeps its id."""
+
+    def make(count):
+        points = np.abs(np.random.default_rng(5).normal(size=(6 + 2 * count, 2)))
+        points *= np.array([100, 3]) / np.linalg.norm(points, axis=1, keepdims=True)
+        return [ask(points[: 6 + 2 * number], generation=number) for number in range(1, count + 1)]
+
+    return make
+
+
+def live(stand_in, questions, previous=None):
+    """Ask all as a run would. Returns the questions as they were asked, with their answers, and the last choice."""
+    decided = []
+    for question in questions:
+        asked, answer = stand_in.decide(replace(question, previous=previous))
+        decided.append((asked, answer))
+        further = stand_in.follow_up(asked, answer)
+        if further:
+            decided.append(stand_in.decide(further))
+        previous = decided[-1][1].policy
+    return decided, previous
+
+
+def written(decided):
+    """The records of decisions, as a log has them."""
+    return [from_json(to_json(record_of(asked, asked.checked(answer)))) for asked, answer in decided]
+
+
+def as_seen(decided):
+    return [
+        (asked.generation, asked.form, asked.again, [policy.id for policy in asked.front], answer)
+        for asked, answer in decided
+    ]
+
+
+def test_a_pair_has_two_policies_and_the_run_goes_on_with_the_best_by_expectation(growing):
+    user = Says(chooses)
+    decided, chosen = live(StandIn(user, 1, ask="always", shows="pair"), growing(10))
+    for (asked, answer), seen in zip(decided, user.questions, strict=True):
+        assert asked is seen and seen.form == "pair" and len(seen.front) == 2
+        assert answer.ranking == best_first(seen)[:1]
+    assert any(answer.policy not in [policy.id for policy in asked.front] for asked, answer in decided)
+    asked, _ = decided[-1]
+    worth = asked.whole.values @ np.array([0.3, 0.7])
+    assert worth.max() - asked.whole.policy(chosen).values @ np.array([0.3, 0.7]) < 0.05 * np.ptp(worth)
+
+
+def test_a_ranked_pair_is_the_same_as_the_better_one(growing):
+    one, other = (live(StandIn(Says(says), 1, ask="always", shows="pair"), growing(4)) for says in (chooses, ranks))
+    assert one[1] == other[1]
+    assert [[policy.id for policy in asked.front] for asked, _ in one[0]] == [
+        [policy.id for policy in asked.front] for asked, _ in other[0]
+    ]
+
+
+def test_none_of_a_pair_keeps_the_last_choice_and_speaks_for_it(ask):
+    line = [[k, 9 - k] for k in range(10)]
+
+    def stand_in():
+        return StandIn(Says(lambda question: Answer(12)), 0, ask="always", shows="pair")
+
+    decided, chosen = live(stand_in(), [ask(line, generation=number) for number in range(1, 7)], previous=12)
+    assert chosen == 12 and all(answer == Answer(12) for asked, answer in decided if 12 not in best_first(asked))
+    assert any(12 not in best_first(asked) for asked, _ in decided)
+    records = written([each for each in decided if 12 not in best_first(each[0])])
+
+    def expected(history):
+        unsure = StandIn(Says(lambda question: Answer(12, equal=True)), 0, history, "always", "pair")
+        return unsure.decide(ask(line, generation=7))[1].policy
+
+    assert abs(expected(records) - 12) <= 1 < abs(expected(()) - 12)
+
+
+def test_who_ends_the_run_with_one_of_a_pair_gets_that_one(growing):
+    def says(question):
+        return Answer(question.front[0].id, stop=question.generation == 4)
+
+    decided, chosen = live(StandIn(Says(says), 1, ask="always", shows="pair"), growing(4))
+    asked, answer = decided[-1]
+    assert answer.stop and chosen == asked.front[0].id
+
+
+def test_a_few_are_ranked_and_the_run_goes_on_with_the_first(growing):
+    user = Says(ranks)
+    decided, _ = live(StandIn(user, 1, ask="always", shows="rank"), growing(4))
+    for asked, answer in decided:
+        assert asked.form == "rank" and len(asked.front) == 5 and asked.others
+        assert answer == ranks(asked)
+
+
+def test_rankings_leave_less_to_ask_than_best_ones(growing):
+    one, other = Says(chooses), Says(ranks)
+    live(StandIn(one, 1, shows="few"), growing(10))
+    live(StandIn(other, 1, shows="rank"), growing(10))
+    assert 1 <= len(other.questions) <= len(one.questions) < 10
+
+
+@pytest.mark.parametrize("shows", ["front", "few", "pair", "rank"])
+def test_who_sees_no_difference_goes_on_with_the_best_by_expectation(growing, shows):
+    def says(question):
+        last = question.generation == 6
+        return Answer(question.front[-1].id, equal=True) if last else chooses(question)
+
+    *_, (asked, answer) = live(StandIn(Says(says), 1, ask="always", shows=shows), growing(6))[0]
+    worth = asked.whole.values @ np.array([0.3, 0.7])
+    assert answer.equal and worth.max() - asked.whole.policy(answer.policy).values @ np.array([0.3, 0.7]) < 0.15 * (
+        np.ptp(worth)
+    )
+
+
+def test_limits_hold_for_the_stand_in_too(growing):
+    """It wants the most of the second objective, and now at least some of the first."""
+
+    def says(question):
+        limits = (60.0, -np.inf) if question.generation == 3 else None
+        good = [policy for policy in question.front if question.generation < 3 or policy.values[0] >= 60]
+        return Answer(max(good or question.front, key=lambda policy: policy.values[1]).id, limits=limits)
+
+    decided, _ = live(StandIn(Says(says), 1, ask="always"), growing(3))
+    assert decided[-1][0].policy(decided[-2][1].policy).values[0] < 60
+    later = StandIn(None, 1, written(decided))
+    question = growing(5)[-1]
+    model_free = StandIn(None, 1, written(decided[:2]))
+    assert question.policy(later.decide(question)[1].policy).values[0] >= 60
+    assert question.policy(model_free.decide(question)[1].policy).values[0] < 60
+
+
+def varied(question):
+    """Answers of every sort, by generation."""
+    if question.again:
+        return Answer(question.front[-1].id)
+    answer = ranks(question) if question.form == "rank" else chooses(question)
+    match question.generation:
+        case 2:
+            return Answer(best_first(question)[0], equal=True)
+        case 3:
+            return replace(answer, limits=(-np.inf, 1.0))
+        case 4 if question.previous is not None:
+            return Answer(question.previous)
+        case 5:
+            return replace(answer, limits=(40.0, -np.inf))
+        case 6:
+            return Answer(question.whole.front[-1].id)
+    return answer
+
+
+@pytest.mark.parametrize("decides", ["always", "unsure"])
+@pytest.mark.parametrize("shows", ["front", "few", "pair", "rank"])
+def test_who_knows_the_records_goes_on_as_who_was_there(growing, shows, decides):
+    parts = [growing(9)[:3], growing(9)[3:6], growing(9)[6:]]
+    lived = StandIn(Says(varied), 3, ask=decides, shows=shows)
+    past: list[Any] = []
+    previous = None
+    for part in parts:
+        resumed = StandIn(Says(varied), 3, written(past), decides, shows)
+        found, _ = live(resumed, part, previous)
+        decided, previous = live(lived, part, previous)
+        assert as_seen(found) == as_seen(decided)
+        past += decided
+
+
+# --- an answer that may be a mistake ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def mistaken(growing):
+    """A stand-in after four answers and one against them, with that question and that answer."""
+
+    def make(decides="unsure", **changes):
+        decided, _ = live(StandIn(Says(chooses), 1, ask="always"), growing(4))
+        question = replace(growing(5)[-1], previous=decided[-1][1].policy)
+        answer = replace(Answer(best_first(question)[-1]), **changes)
+        records = written([*decided, (question, answer)])
+        return StandIn(Says(chooses), 1, records, decides), question, answer
+
+    return make
+
+
+def test_an_answer_against_all_earlier_ones_is_asked_again_as_a_pair(mistaken):
+    stand_in, question, answer = mistaken()
+    further: Any = stand_in.follow_up(question, answer)
+    best, chosen = further.front
+    worth = question.values @ np.array([0.3, 0.7])
+    assert chosen.id == answer.policy
+    assert worth.max() - best.values @ np.array([0.3, 0.7]) < 0.05 * np.ptp(worth)
+    assert further.again and (further.purpose, further.generation) == (question.purpose, question.generation)
+    assert {policy.id for policy in further.whole.front} == {policy.id for policy in question.front}
+
+
+def test_who_says_so_twice_is_believed(mistaken):
+    stand_in, question, answer = mistaken()
+    further: Any = stand_in.follow_up(question, answer)
+    stand_in.user = Says(lambda asked: answer)
+    asked, second = stand_in.decide(further)
+    assert second == answer and asked.front == further.front
+    assert stand_in.follow_up(asked, second) is None
+
+
+def test_who_corrects_themselves_is_not_asked_a_third_time(mistaken):
+    stand_in, question, answer = mistaken()
+    further: Any = stand_in.follow_up(question, answer)
+    asked, second = stand_in.decide(further)
+    assert second.policy == further.front[0].id and not second.stand_in
+    assert stand_in.follow_up(asked, second) is None
+
+
+@pytest.mark.parametrize("changes", [{"stand_in": True}, {"stop": True}])
+def test_neither_a_stand_in_nor_who_ends_the_run_is_doubted(mistaken, changes):
+    stand_in, question, answer = mistaken()
+    assert stand_in.follow_up(question, replace(answer, **changes)) is None
+
+
+def test_who_wants_to_be_asked_always_is_not_doubted(mistaken):
+    stand_in, question, answer = mistaken("always")
+    assert stand_in.follow_up(question, answer) is None
+
+
+def test_what_agrees_with_the_other_answers_is_not_doubted(mistaken):
+    stand_in, question, _ = mistaken()
+    assert stand_in.follow_up(question, chooses(question)) is None
+
+
+def test_a_pair_or_a_ranking_is_not_asked_again(mistaken):
+    stand_in, question, answer = mistaken()
+    for form in ("pair", "rank"):
+        assert stand_in.follow_up(replace(question, form=form), answer) is None
+
+
+def test_the_second_question_has_the_limits_of_the_first_answer(mistaken):
+    stand_in, question, answer = mistaken(limits=(-np.inf, 0.0))
+    further: Any = stand_in.follow_up(question, answer)
+    assert further.limits == (-np.inf, 0.0)
+
+
+class Errs(Counting):
+    """The config's user, who once chooses the worst of all; `corrects` says whether they mend it when asked again."""
+
+    def __init__(self, config, corrects):
+        super().__init__(config)
+        self.corrects = corrects
+        self.wrong = None
+        self.doubted = 0
+
+    def answer(self, question):
+        right = super().answer(question)
+        self.doubted += question.again
+        if question.again and not self.corrects:
+            return Answer(self.wrong)
+        if len(self.asked) == 3 and not question.again:
+            self.wrong = question.whole.front[int(np.argmin(self.user.utility(question.whole.values)))].id
+            return Answer(self.wrong)
+        return right
+
+
+@pytest.mark.parametrize("corrects", [True, False])
+def test_a_run_takes_the_second_answer_and_counts_both_questions(config, corrects, tmp_path):
+    user = Errs(config, corrects)
+    *everything, last = run(config, user)
+    events = decisions(everything)
+    places = [place for place, event in enumerate(events) if event.question.again]
+    assert len(places) == user.doubted >= 1
+    first, second = events[places[0] - 1], events[places[0]]
+    assert first.chosen.id == user.wrong and first.question.generation == second.question.generation
+    assert (second.chosen.id == user.wrong) != corrects
+    after: Any = events[places[0] + 1].question
+    assert after.previous == second.chosen.id
+    assert last.state.questions == len(user.asked) == sum(not event.answer.stand_in for event in events)
+    log = tmp_path / "decisions.jsonl"
+    log.write_text("".join(to_json(record_of(event.question, event.answer)) + "\n" for event in events))
+    replayed = decisions(run(config, ScriptedUser(log)))
+    assert [event.chosen.id for event in replayed] == [event.chosen.id for event in events]
+
+
+def test_a_run_that_was_broken_off_between_two_answers_goes_on_with_the_second(config, tmp_path):
+    whole = train(tmp_path / "whole", config, user=Errs(config, corrects=False))
+    records = read_run(whole).decisions
+    again = next(place for place, record in enumerate(records) if record.again)
+    place = 1 + records[again].generation + again  # after so many events: the start, generations, answers
+    path = train(tmp_path / "broken", config, user=Errs(config, corrects=False), events=place)
+    left = read_run(path).decisions
+    assert left == records[:again] and left[-1].policy == records[again].policy
+
+    user = Errs(config, corrects=False)
+    user.asked, user.wrong = [()] * 3, records[again].policy
+    go_on(path, user=user)
+    assert outcome(path) == outcome(whole)

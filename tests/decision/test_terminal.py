@@ -16,6 +16,7 @@ from jmorl.display.console import PlainConsole
 
 # Policies 10, 11, 12 in the tests below.
 VALUES = [[-70, -40], [-66.25, -57], [-100, -20]]
+LIMIT = "Name an objective and what it must reach, for example: limit fuel 5; or: limit fuel none"
 HAND = np.array([[0, 12], [1, 11], [2, 10], [10, 4], [11, 3], [12, 0]], float)
 
 
@@ -69,6 +70,12 @@ def point_question(front_of, objectives_of):
         ("12 GO 1", Answer(12, generations=1)),
         ("q", Answer(11, stop=True)),
         ("12 q", Answer(12, stop=True)),
+        ("12 10 11", Answer(12, ranking=(12, 10, 11))),
+        ("12 10", Answer(12, ranking=(12, 10))),
+        ("12 10 11 q", Answer(12, stop=True, ranking=(12, 10, 11))),
+        ("12 10 go 3", Answer(12, generations=3, ranking=(12, 10))),
+        ("same", Answer(11, equal=True)),
+        ("SAME", Answer(11, equal=True)),
     ],
 )
 def test_commands(ask, line, answer):
@@ -90,7 +97,18 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
         ("12.0", "I do not understand '12.0'"),
         ("[/red]", "I do not understand '[/red]'"),
         ("12 please", "I do not understand '12 please'; ? lists what you can type."),
-        ("12 11", "I do not understand '12 11'"),
+        ("12 12", "Name each policy once, from the best down."),
+        ("12 99 98", "Only the policies shown can be put in order, and 99, 98 is not among them."),
+        ("12 10 now", "I do not understand '12 10 now'"),
+        ("same same", "I do not understand 'same'"),
+        ("12 10 go", "Say for how many generations"),
+        ("limit", LIMIT),
+        ("limit fuel", LIMIT),
+        ("limit 5", LIMIT),
+        ("limit speed 5", LIMIT),
+        ("limit fuel low", "A limit is a number, or none; 'low' is neither."),
+        ("limit fuel nan", "A limit is a number, or none; 'nan' is neither."),
+        ("limit fuel inf", "A limit is a number, or none; 'inf' is neither."),
         ("12 q now", "I do not understand '12 q now'"),
         ("q 12", "I do not understand 'q 12'"),
         ("go", "Say for how many generations to go on, for example: go 5"),
@@ -145,7 +163,10 @@ def test_help(ask, line):
     session.user.answer(ask(VALUES))
     for text in (
         "  12           choose policy 12\n",
-        "  Enter        keep your last choice\n",
+        "  Enter        keep your last choice: none of these is better\n",
+        "  12 4 9       prefer policy 12, then 4, then 9, to all others\n",
+        "  same         no difference between these\n",
+        "  limit fuel 5 from now on, rule out what does not reach this",
         "  more fuel    list the policies with the most of an objective first\n",
         "  12 go 5      choose policy 12, then no question for 5 generations (or go 5)\n",
         "  12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)\n",
@@ -187,6 +208,74 @@ def test_all_lists_the_policies_that_a_short_question_leaves_out(ask):
     before, after = session.output.split("12 ", 1)[0], session.output
     assert "(all lists 1 other.)" in before and "-20.0" not in before and "-20.0" in after
     assert Session("12").user.answer(short) == Answer(12)
+
+
+def test_only_what_is_shown_can_be_ranked_until_all_are(ask):
+    question = ask(VALUES)
+    short = replace(question, front=question.front[:2], others=question.front[2:])
+    session = Session("12 10", "all", "12 10")
+    assert session.user.answer(short) == Answer(12, ranking=(12, 10))
+    assert session.sentences.count("Only the policies shown can be put in order, and 12 is not among them.") == 1
+
+
+@pytest.mark.parametrize("previous", [None, 9])
+def test_no_difference_without_a_last_choice_in_the_front_goes_on_with_one_of_those_shown(ask, previous):
+    answer = Session("same").user.answer(ask(VALUES, previous=previous))
+    assert answer.equal and answer.policy in (10, 11, 12)
+
+
+@pytest.mark.parametrize("line", ["limit fuel -45", "limit 2 -45", "LIMIT Fuel Label -45.0", "limit f -4.5e1"])
+def test_a_limit_marks_what_does_not_reach_it_and_goes_with_the_answer(ask, line):
+    session = Session(line, "10")
+    assert session.user.answer(ask(VALUES, previous=11)) == Answer(10, limits=(-np.inf, -45.0))
+    before, after = ({row.split()[0]: row for row in rows} for rows in tables_shown(session))
+    assert "beyond your limits" not in " ".join(before.values())
+    assert {policy for policy, row in after.items() if "beyond your limits" in row} == {"11"}
+
+
+def test_limits_of_several_objectives_add_up_and_one_can_be_taken_back(ask):
+    session = Session("limit time -80", "limit fuel -45", "limit time none", "12 10")
+    assert session.user.answer(ask(VALUES)) == Answer(12, ranking=(12, 10), limits=(-np.inf, -45.0))
+    assert [["beyond" in row for row in sorted(rows)] for rows in tables_shown(session)] == [
+        [False, False, False],
+        [False, False, True],
+        [False, True, True],
+        [False, True, False],
+    ]
+
+
+def test_limits_that_hold_already_are_shown_and_only_a_change_is_in_the_answer(ask):
+    question = replace(ask(VALUES), limits=(-np.inf, -45.0))
+    session = Session("10")
+    assert session.user.answer(question) == Answer(10)
+    assert ["beyond" in row for row in sorted(*tables_shown(session))] == [False, True, False]
+    assert Session("limit fuel -45", "10").user.answer(question) == Answer(10)
+    assert Session("limit fuel none", "10").user.answer(question) == Answer(10, limits=(-np.inf, -np.inf))
+    assert Session("limit time -80", "10").user.answer(question) == Answer(10, limits=(-80.0, -45.0))
+
+
+def test_a_limit_survives_a_look_at_all_policies(ask):
+    question = ask(VALUES)
+    short = replace(question, front=question.front[:2], others=question.front[2:])
+    session = Session("limit time -80", "all", "10")
+    assert session.user.answer(short) == Answer(10, limits=(-80.0, -np.inf))
+    assert ["beyond" in row for row in sorted(tables_shown(session)[-1])] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("purpose", "form", "again", "heading"),
+    [
+        ("steer", "pair", False, "Generation 4. Which one of these two policies do you prefer?"),
+        ("final", "pair", False, "The run is over. Which one of these two policies do you prefer?"),
+        ("steer", "rank", False, "Generation 4. In which order do you prefer these 2 policies?"),
+        ("steer", "best", True, "Generation 4. Your earlier answers speak for the other one of these two. Which one"),
+        ("final", "best", True, "The run is over. Your earlier answers speak for the other one of these two."),
+    ],
+)
+def test_the_heading_says_what_is_asked(ask, purpose, form, again, heading):
+    session = Session("10")
+    session.user.answer(replace(ask(VALUES[:2], purpose=purpose, generation=4), form=form, again=again))
+    assert heading in session.sentences
 
 
 def test_an_ambiguous_objective_is_asked_for_again(ask):

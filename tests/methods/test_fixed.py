@@ -31,7 +31,8 @@ def test_every_agent_keeps_its_weights_and_goes_on_from_itself(events):
 def test_somebody_is_asked_once_at_the_end_about_the_whole_archive(events):
     asked = [event for event in events if hasattr(event, "answer")]
     assert [event.question.purpose for event in asked] == ["final"]
-    assert asked[0].question.front == events[-1].state.archive.members
+    archived = {policy.id for policy in events[-1].state.archive.members}
+    assert {policy.id for policy in asked[0].question.whole.front} == archived
     assert all(event.generations_to_question is None for event in generations(events))
 
 

@@ -66,6 +66,6 @@ def test_a_choice_rules_itself_in(events, small_config):
 def test_without_slack_only_what_is_at_least_as_good_is_kept(events, small_config):
     """On a front nothing is at least as good as another member."""
     state = next(event.state for event in events if isinstance(event, GenerationFinished))
-    config = small_config.replace(search={"delta": 0.0})
+    config = small_config.replace(search={"delta": 0.0, "least_within": 0, "least_slack": 0.0})
     for policy in state.archive.members:
         assert prospect(config, state, policy).kept.sum() == 1

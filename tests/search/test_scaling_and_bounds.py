@@ -106,6 +106,37 @@ def test_slack_may_have_a_least_that_does_not_depend_on_where_zero_lies() -> Non
     np.testing.assert_allclose(bounds.lower, [-0.5, -1010.0])
 
 
+def test_bounds_that_give_way_stop_at_a_limit_less_their_slack_at_first() -> None:
+    preferred, unit = np.array([100.0, -4.0]), np.array([100.0, 4.0])  # so the slack is 10 and 0.4
+    values = np.array([[65.0, -4.5], [65.0, -5.5], [-500.0, 0.0]])
+    free = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1)
+    np.testing.assert_allclose(free.lower, [60, -5.6])
+    bounds = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1, (-np.inf, -4.3))
+    np.testing.assert_allclose(bounds.lower, [60, -4.7])
+    assert bounds.widenings == free.widenings == 2
+
+
+def test_a_limit_below_the_bounds_and_no_limit_at_all_change_nothing() -> None:
+    preferred, unit, values = np.array([100.0, -4.0]), np.array([100.0, 4.0]), np.array([[65.0, -4.0]])
+    free = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1)
+    for limits in ((-np.inf, -np.inf), (40.0, -10.0)):
+        bounds = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1, limits)
+        np.testing.assert_array_equal(bounds.lower, free.lower)
+        assert bounds.widenings == free.widenings > 0
+
+
+@given(vectors, amounts, vectors, arrays(float, (5, 3), elements=finite), st.integers(0, 5))
+def test_limits_only_raise_bounds_and_never_exclude_the_choice(
+    preferred: np.ndarray, slack: np.ndarray, limits: np.ndarray, values: np.ndarray, least: int
+) -> None:
+    first = preferred - slack
+    free = widened_bounds(preferred, 0.0, slack, slack, values, least)
+    bounds = widened_bounds(preferred, 0.0, slack, slack, values, least, limits.tolist())
+    assert within(preferred[None], bounds.lower).all()
+    assert (bounds.lower >= np.minimum(limits, preferred) - slack).all() and (bounds.lower <= first).all()
+    assert bounds.widenings >= free.widenings
+
+
 def test_within_needs_every_objective() -> None:
     values = np.array([[1.0, 1.0, 1.0], [1.0, 0.9, 2.0], [5.0, 5.0, 5.0]])
     assert within(values, np.ones(3)).tolist() == [True, False, True]

@@ -69,6 +69,7 @@ def make_state(make_policy, small_config):
                 silent_generations=generation,
                 widenings=generation + 1,
                 generations_with_choice=generation + 2,
+                limits=(-np.inf, 1.0, 2.0 + generation),
             ),
             archive=Archive((policies[3], policies[0], policies[-1])),
             units=RunningUnits(*generator.normal(size=(4, 3))),

@@ -1,6 +1,7 @@
 """A packed state is the state: every field, every bit, and which policies are one and the same."""
 
 import dataclasses
+import json
 
 import jax
 import numpy as np
@@ -79,6 +80,17 @@ def test_the_comparison_of_these_tests_sees_every_field(make_state):
     other.choice.snapshot.observation_statistics.mean.view(np.int32)[0] ^= 1
     with pytest.raises(AssertionError):
         assert_same(state, other)
+
+
+@pytest.mark.parametrize("limits", [None, (-np.inf, -np.inf, -np.inf), (0.1, -np.inf, -1e-300)])
+def test_limits_that_were_never_set_and_those_that_were_taken_back_stay_apart(
+    make_state, small_config, environment, method, limits
+):
+    state = make_state(1)
+    state = dataclasses.replace(state, search=dataclasses.replace(state.search, limits=limits))
+    packed = pack(state, method)
+    json.dumps(packed.document, allow_nan=False)
+    assert_same(state, unpack(packed, small_config, environment))
 
 
 def test_a_policy_in_several_places_stays_one(make_state, small_config, environment, method):

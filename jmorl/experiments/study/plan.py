@@ -1,19 +1,19 @@
-"""The plan of a study, a TOML file: users, methods and seeds, and the runs that they make.
+"""The plan of a study, a TOML file: users, contenders and seeds, and the runs that they make.
 
     seeds = [1, 2, 3]
 
-    [methods]                      # settings of each contender
+    [contenders]                   # their settings
     interactive = {}
     PGMORL = { method = "pgmorl" }
 
-    [[parts]]                      # all of one environment and budget; `methods` are all, or those named
+    [[parts]]                      # all of one environment and budget; `contenders` are all, or those named
     name = "mountaincar"
     env = "mo-mountaincarcontinuous-v0"
     steps = 2_500_000
     best = "../exact_front.json"   # optional: a file of the best there is; else it is the best of all runs
     users = { A = "A", "almost A" = "A,random=0.2", "a target" = "target=-60,-50" }
 
-A method that asks nobody before its end makes one run for all users of a part.
+A contender that asks nobody before its end makes one run for all users of a part.
 """
 
 import json
@@ -48,47 +48,49 @@ class StudyPart:
     env: str
     steps: int
     users: dict[str, str]  # name -> as `--user` takes it
-    methods: tuple[str, ...] = ()  # of the study's; empty: all
+    contenders: tuple[str, ...] = ()  # of the study's; empty: all
     best: str | None = None  # a file with vectors that are the best there is
 
 
 @dataclass(frozen=True)
 class Study:
-    """Users, methods and seeds."""
+    """Users, contenders and seeds."""
 
     seeds: tuple[int, ...]
-    methods: dict[str, dict[str, Any]]  # name -> settings
+    contenders: dict[str, dict[str, Any]]  # name -> settings
     parts: tuple[StudyPart, ...]
     records: tuple[str, ...] = ()  # folders with records of other comparisons that are taken where they fit
     folder: Path = Path()  # of the plan, to which all paths in it are relative
 
-    def methods_of(self, part: StudyPart) -> tuple[str, ...]:
-        """Return the names of a part's methods, in the order of the study."""
-        return tuple(name for name in self.methods if not part.methods or name in part.methods)
+    def contenders_of(self, part: StudyPart) -> tuple[str, ...]:
+        """Return the names of a part's contenders, in the order of the study."""
+        return tuple(name for name in self.contenders if not part.contenders or name in part.contenders)
 
-    def config(self, part: StudyPart, method: str, user: str | None, seed: int) -> Config:
+    def config(self, part: StudyPart, contender: str, user: str | None, seed: int) -> Config:
         """Return the settings of a run; without a user, of one whom any result will do. Raises ConfigError."""
         objectives = len(envs.make(part.env).objectives)
         nobody = "A" if objectives == 2 else f"weights={','.join('1' * objectives)}"
         given = {"env": part.env, "user": part.users[user] if user else nobody, "seed": seed, "steps": part.steps}
-        return resolve(overrides={**self.methods[method], **given, "checkpoints": {"keep": 2}})
+        return resolve(overrides={**self.contenders[contender], **given, "checkpoints": {"keep": 2}})
 
-    def cell(self, part: StudyPart, method: str, user: str, seed: int) -> Cell:
-        """Return the run of a method for a user; for one that asks nobody, the run for everybody."""
-        if not self.asks(part, method):
-            return Cell(file_name(part.name, method, EVERYBODY, f"seed {seed}"), self.config(part, method, None, seed))
-        return Cell(file_name(part.name, method, user, f"seed {seed}"), self.config(part, method, user, seed))
+    def cell(self, part: StudyPart, contender: str, user: str, seed: int) -> Cell:
+        """Return the run of a contender for a user; for one that asks nobody, the run for everybody."""
+        if not self.asks(part, contender):
+            return Cell(
+                file_name(part.name, contender, EVERYBODY, f"seed {seed}"), self.config(part, contender, None, seed)
+            )
+        return Cell(file_name(part.name, contender, user, f"seed {seed}"), self.config(part, contender, user, seed))
 
     def cells(self, part: StudyPart) -> list[Cell]:
         """Return the runs of a part: seed by seed, so that what there is of a study is about all of it."""
         return [
-            self.cell(part, method, user, seed)
-            for seed, user, method in product(self.seeds, part.users, self.methods_of(part))
+            self.cell(part, contender, user, seed)
+            for seed, user, contender in product(self.seeds, part.users, self.contenders_of(part))
         ]
 
-    def asks(self, part: StudyPart, method: str) -> bool:
-        """Return whether a method asks anybody before its end."""
-        config = self.config(part, method, None, self.seeds[0])
+    def asks(self, part: StudyPart, contender: str) -> bool:
+        """Return whether a contender asks anybody before its end."""
+        config = self.config(part, contender, None, self.seeds[0])
         found = make_method(config, envs.make(part.env))
         return found.generations_to_question(found.initial_state()) is not None
 
@@ -132,7 +134,7 @@ def read_plan(path: Path) -> Study:
 
 
 def _problems(study: Study) -> Iterator[str]:
-    for what, given in (("seed", study.seeds), ("method", study.methods), ("part", study.parts)):
+    for what, given in (("seed", study.seeds), ("contender", study.contenders), ("part", study.parts)):
         if not given:
             yield f"there is no {what}"
     if len(set(study.seeds)) < len(study.seeds):
@@ -140,20 +142,20 @@ def _problems(study: Study) -> Iterator[str]:
     if len({part.name for part in study.parts}) < len(study.parts):
         yield "two parts have one name"
     users = [user for part in study.parts for user in part.users]
-    for name in (*study.methods, *(part.name for part in study.parts), *users):
+    for name in (*study.contenders, *(part.name for part in study.parts), *users):
         if not is_name(name):
             yield f"{name!r}: files are named after it; write it with letters, digits and spaces"
     for part in study.parts:
         if not part.users:
             yield f"part {part.name} has no users"
-        for method in (each for each in part.methods if each not in study.methods):
-            yield f"part {part.name}: there is no method {method!r}; there are {', '.join(study.methods)}"
-        for method, user, seed in product(study.methods_of(part), part.users, study.seeds[:1]):
+        for contender in (each for each in part.contenders if each not in study.contenders):
+            yield f"part {part.name}: there is no contender {contender!r}; there are {', '.join(study.contenders)}"
+        for contender, user, seed in product(study.contenders_of(part), part.users, study.seeds[:1]):
             try:
-                study.config(part, method, user, seed)
+                study.config(part, contender, user, seed)
                 judge = study.user(part, user)
             except (ConfigError, ValueError) as error:
-                yield f"part {part.name}, {method}, {user}: {error}"
+                yield f"part {part.name}, {contender}, {user}: {error}"
                 continue
             objectives = len(envs.make(part.env).objectives)
             if not isinstance(judge, TargetUser) and judge.utility(np.zeros((1, objectives))) is None:

@@ -64,7 +64,7 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
         )
         yield _user_table(users)
         yield "Utility gained against the other methods, as paired differences (clear: the interval excludes 0):"
-        yield _gains(users, study.methods_of(part))
+        yield _gains(users, study.contenders_of(part))
     if targets:
         yield tables.steps_used(targets)
         yield tables.seed_by_seed(targets)
@@ -112,7 +112,7 @@ def _gains(rows: Sequence[UserRow], methods: Sequence[str]) -> str:
 def _calibrations(study: Study, part: StudyPart, records: Records) -> str:
     head = ["method", "values forecast", "in their 80 % intervals", "results confirmed", "within the stated error"]
     lines = []
-    for method in study.methods_of(part):
+    for method in study.contenders_of(part):
         keys = dict.fromkeys(study.cell(part, method, user, seed).key for user in part.users for seed in study.seeds)
         found = calibration([records[key] for key in keys if key in records])
         right = share(found.within, found.confirmed) if found.confirmed else ""

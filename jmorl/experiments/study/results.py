@@ -56,7 +56,7 @@ def user_rows(study: Study, part: StudyPart, records: Records) -> list[UserRow]:
         if isinstance(judge, TargetUser):
             continue
         best = _best(study, part, judge, records)
-        for method in study.methods_of(part):
+        for method in study.contenders_of(part):
             there = _runs(study, part, method, user, records)
             if there:
                 rows.append(_user_row(study, part, user, method, judge, best, there))
@@ -68,7 +68,7 @@ def target_rows(study: Study, part: StudyPart, records: Records) -> list[TargetR
     rows = []
     for user in part.users:
         judge = study.user(part, user)
-        for method in study.methods_of(part):
+        for method in study.contenders_of(part):
             there = _runs(study, part, method, user, records)
             if isinstance(judge, TargetUser) and there:
                 target = tuple(judge.target.tolist())

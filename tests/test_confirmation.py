@@ -1,0 +1,133 @@
+"""Confirmed scores: from fresh starts, of the finalists, before the last question, and in everything a run leaves."""
+
+import json
+
+import jax
+import numpy as np
+import pytest
+
+import envs
+from jmorl.confirmation import confirmed, finalists
+from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.events import Decided, GenerationFinished, RunFinished
+from jmorl.experiments.record import record_of
+from jmorl.learning.population import Population
+from jmorl.loop import run
+from jmorl.report.progress import watcher
+from jmorl.report.tables import run_tables
+from jmorl.storage.policy_file import load_policy
+from jmorl.storage.stored_run import read_run
+from tests.resuming import train
+
+EPISODES = 8
+
+
+@pytest.fixture(scope="module")
+def config(small_config):
+    return small_config.replace(evaluation={"confirmation_episodes": EPISODES})
+
+
+@pytest.fixture(scope="module")
+def events(config):
+    return list(run(config))
+
+
+@pytest.fixture(scope="module")
+def folder(config, tmp_path_factory):
+    return train(tmp_path_factory.mktemp("runs") / "confirmed", config)
+
+
+def test_the_last_question_shows_confirmed_scores_of_all_finalists(events):
+    final = [event for event in events if isinstance(event, Decided)][-1]
+    archive = {policy.id: policy for policy in events[-1].state.archive.members}
+    assert final.question.purpose == "final" and len(final.question.front) > 1
+    for policy in final.question.front:
+        found = policy.confirmation
+        assert found.episodes == EPISODES
+        np.testing.assert_array_equal(found.claimed, archive[policy.id].values)
+        assert not np.array_equal(policy.values, found.claimed)
+    assert events[-1].chosen is final.chosen
+
+
+def test_what_is_trained_before_does_not_depend_on_it(events, small_config):
+    plain = list(run(small_config))
+    pairs = [
+        (one.state.archive.values, other.state.archive.values)
+        for one, other in zip(plain, events, strict=True)
+        if isinstance(one, GenerationFinished)
+    ]
+    assert len(pairs) == 4
+    for one, other in pairs:
+        np.testing.assert_array_equal(one, other)
+    assert plain[-1].chosen.confirmation is None
+
+
+def test_steps_of_confirmations_are_counted(events, config):
+    before, after = [event.state for event in events if isinstance(event, GenerationFinished)][-1], events[-1].state
+    finalists = [event for event in events if isinstance(event, Decided)][-1].question.front
+    length = (after.evaluation_steps - before.evaluation_steps) / (4 * -(-len(finalists) // 4) * EPISODES)
+    assert length == envs.make(config.env).time_limit
+
+
+def test_the_score_is_that_of_the_policy_alone(events, config):
+    """Mean, spread and error of episodes from the starts that the key gives, whoever is scored beside it."""
+    policies = events[-1].state.archive.members
+    population = Population(envs.make(config.env), config.learning)
+    key = jax.random.key(3)
+    together, _ = confirmed(policies, population, key, 5, 2)
+    [alone], _ = confirmed(policies[1:2], population, key, 5, 2)
+    assert alone.confirmation.episodes == 6  # whole calls of 2
+    np.testing.assert_allclose(alone.values, together[1].values, rtol=1e-6)
+    error = 2.5758 * alone.std / np.sqrt(5)
+    np.testing.assert_allclose(alone.confirmation.error, error, rtol=1e-4)
+
+
+def test_a_run_that_somebody_stops_confirms_its_result(config):
+    class Stopper(DecisionMaker):
+        def answer(self, question):
+            return Answer(question.front[0].id, stop=True)
+
+    end = list(run(config, Stopper()))[-1]
+    assert isinstance(end, RunFinished) and end.reason == "stopped" and end.chosen.confirmation.episodes == EPISODES
+
+
+def test_scores_in_drifting_units_are_not_confirmed(config):
+    paper = config.replace(evaluation={"units": "paper", "actions": "sampled"})
+    assert list(run(paper))[-1].chosen.confirmation is None
+
+
+def test_few_are_all_finalists_and_of_many_those_near_the_choice(events):
+    front = list(events[-1].state.archive.members)
+    assert finalists(front, None, len(front)) == front
+    many = front * 40
+    assert finalists(many, None, 1) == []
+    near = finalists(many, front[0], 1)
+    assert len(near) == 4 and set(near) == {front[0]}
+
+
+def test_everything_that_a_run_leaves_has_both_scores(folder):
+    stored = read_run(folder)
+    result = json.loads((folder / "result.json").read_text())["chosen"]
+    chosen, found = stored.chosen, stored.chosen.confirmation
+    assert found.episodes == result["confirmation_episodes"] == EPISODES
+    assert chosen.values[0] == result[f"value_{stored.objectives[0].name}"]
+    np.testing.assert_array_equal(found.claimed, stored.policies[chosen.id].values)
+    header = load_policy(folder / "chosen.npz").header
+    assert header["values"] == chosen.values.tolist() and header["evaluation_episodes"] == EPISODES
+    confirmed = record_of(stored).confirmed
+    np.testing.assert_allclose(confirmed.values, chosen.values, rtol=1e-6)
+    np.testing.assert_allclose(confirmed.error, found.error, rtol=1e-6)
+
+
+def test_people_are_told(folder, events, config, capsys):
+    from rich.console import Console
+
+    console = Console(width=200)
+    for table in run_tables(read_run(folder)):
+        console.print(table)
+    told = capsys.readouterr().out
+    assert "on 8 fresh episodes; " in told and " in the search" in told
+    from jmorl.display.console import PlainConsole
+
+    watcher("lines", config, envs.make(config.env).objectives, PlainConsole()).show(events[-1])
+    assert "on 8 fresh episodes; " in capsys.readouterr().out
