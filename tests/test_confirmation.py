@@ -40,8 +40,8 @@ def folder(config, tmp_path_factory):
 def test_the_last_question_shows_confirmed_scores_of_all_finalists(events):
     final = [event for event in events if isinstance(event, Decided)][-1]
     archive = {policy.id: policy for policy in events[-1].state.archive.members}
-    assert final.question.purpose == "final" and len(final.question.front) > 1
-    for policy in final.question.front:
+    assert final.question.purpose == "final" and len(final.question.shown) > 1
+    for policy in final.question.shown:
         found = policy.confirmation
         assert found.episodes == EPISODES
         np.testing.assert_array_equal(found.claimed, archive[policy.id].values)
@@ -64,7 +64,7 @@ def test_what_is_trained_before_does_not_depend_on_it(events, small_config):
 
 def test_steps_of_confirmations_are_counted(events, config):
     before, after = [event.state for event in events if isinstance(event, GenerationFinished)][-1], events[-1].state
-    finalists = [event for event in events if isinstance(event, Decided)][-1].question.front
+    finalists = [event for event in events if isinstance(event, Decided)][-1].question.shown
     length = (after.evaluation_steps - before.evaluation_steps) / (4 * -(-len(finalists) // 4) * EPISODES)
     assert length == envs.make(config.env).time_limit
 
