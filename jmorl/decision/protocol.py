@@ -335,7 +335,12 @@ PointAnswer = Choose | Back | Adjust
 
 
 class DecisionMaker(ABC):
-    """Somebody, or something, that prefers one policy to another."""
+    """Somebody, or something, that prefers one policy to another.
+
+    Who is `patient` minds no questions, so that no stand-in answers for them.
+    """
+
+    patient = False
 
     @abstractmethod
     def answer(self, question: Question) -> Answer:

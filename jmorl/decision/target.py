@@ -16,11 +16,12 @@ class TargetUser(DecisionMaker):
     Distances are Euclidean, in units of the front's range, because the raw units of two objectives need not have
     anything in common; with `scaled` off in the values' own units, as in the paper. Of several policies that reach
     the target it takes the one that clears it by most in its tightest objective, which is the safest claim, as
-    scores are estimates. Ties go to the first.
+    scores are estimates. Ties go to the first. It is an aim and nobody's time, and so it is patient.
     """
 
     target: np.ndarray  # [M]
     scaled: bool = True
+    patient = True
 
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""

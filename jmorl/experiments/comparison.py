@@ -133,6 +133,7 @@ class _Until(DecisionMaker):
 
     def __init__(self, user: DecisionMaker, target: TargetUser):
         self.user, self.target = user, target
+        self.patient = user.patient
 
     def answer(self, question: Question) -> Answer:
         return self.user.answer(question)

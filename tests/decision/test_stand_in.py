@@ -53,6 +53,13 @@ def test_only_a_part_of_the_questions_reaches_the_user(config, small_config):
             assert utility(chosen.chosen.values[None]) >= worth.max() - 0.05 * np.ptp(worth)
 
 
+def test_a_target_is_nobodys_time_and_asked_every_time(config):
+    """Steering to a point by answers that are only almost right takes longer."""
+    events = list(run(config.replace(user="target=0,0,0")))
+    assert len(decisions(events)) == 9
+    assert not any(event.answer.stand_in for event in decisions(events))
+
+
 def test_the_log_and_the_table_tell_whose_an_answer_is(whole, tmp_path, capsys):
     records = read_run(whole).decisions
     assert {record.stand_in for record in records} == {True, False}
