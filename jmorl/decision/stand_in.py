@@ -27,12 +27,11 @@ FEW = 5  # policies in a short question
 class StandIn(Wrapper):
     """Answers as `user` would, by a preference model of their answers, and asks them where it is not sure.
 
-    It is sure where its expected regret is small (`TRUSTED_REGRET`); with `ask` "always", or for a patient user, it never
-    is. With `shows`
-    "few" it asks about few policies at a time: the best by expectation, the one that was chosen last, and those whose
-    comparison tells most; with "rank" for their order; with "pair" about two, after which it goes on with the best by
-    expectation. `history` has the records of a run that goes on; only what the user said themselves counts. The same
-    answers give the same posterior.
+    It is sure where its expected regret is small (`TRUSTED_REGRET`); with `ask` "always", or for a patient user, it
+    never is. With `shows` "few" it asks about few policies at a time: the best by expectation, the one that was chosen
+    last, and those whose comparison tells most; with "rank" for their order; with "pair" about two, after which it goes
+    on with the best by expectation. `history` has the records of a run that goes on; only what the user said themselves
+    counts. The same answers give the same posterior.
     """
 
     def __init__(

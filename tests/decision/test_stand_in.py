@@ -112,7 +112,7 @@ def test_other_questions_are_the_users(front_of):
 
 
 def test_a_front_of_one_needs_nobody(ask):
-    assert StandIn(None, 0).respond(ask([[1, 2]])) == Answer(10, stand_in=True)
+    assert StandIn(Says(None), 0).respond(ask([[1, 2]])) == Answer(10, stand_in=True)
 
 
 def test_a_branch_knows_what_was_answered_before_it(whole, config, tmp_path):
@@ -346,9 +346,9 @@ def test_limits_hold_for_the_stand_in_too(growing):
 
     decided, _ = live(StandIn(Says(says), 1, ask="always"), growing(3))
     assert decided[-1][0].policy(decided[-2][1].policy).values[0] < 60
-    later = StandIn(None, 1, written(decided))
+    later = StandIn(Says(None), 1, written(decided))
     question = growing(5)[-1]
-    model_free = StandIn(None, 1, written(decided[:2]))
+    model_free = StandIn(Says(None), 1, written(decided[:2]))
     assert question.policy(later.decide(question)[1].policy).values[0] >= 60
     assert question.policy(model_free.decide(question)[1].policy).values[0] < 60
 
