@@ -176,6 +176,7 @@ def _add_continuing(commands: Any) -> None:
         "resume", help="go on with a run that was interrupted, to the result it would have had"
     )
     resume.add_argument("run", type=to_path, metavar="RUN", help="run folder")
+    resume.add_argument("--ask-now", action="store_true", help="the next question is for the user, not for a stand-in")
     _add_output(resume)
 
     branch = commands.add_parser("branch", help="begin a new run where a run was after one of its generations")

@@ -99,7 +99,7 @@ def _resume(options: argparse.Namespace) -> None:
     if not Layout(options.run).result.exists():
         _check_json(options, _stored_user(options.run))
     try:
-        continued = resume(options.run)
+        continued = resume(options.run, ask_now=options.ask_now)
     except AlreadyFinished as finished:
         if not options.quiet:
             print(f"jmorl: {finished}", file=sys.stderr)

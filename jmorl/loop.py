@@ -47,13 +47,15 @@ def run(
     population: Population | None = None,
     history: Sequence[RunRecord] = (),
     selecting: Callable[[], AbstractContextManager[object]] = nullcontext,
+    ask_now: bool = False,
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
     `decision_maker` and `environment` default to those the config names. With the `state` that a generation of an
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
     An `environment` that is not the config's is refused with NotAsDeclared.
-    The `history` of its decisions is what a stand-in needs to know then (`ask` and `question` in the config). The
+    The `history` of its decisions is what a stand-in needs to know then (`ask` and `question` in the config); with
+    `ask_now` it leaves the next question to the decision maker. The
     tasks of a generation are selected within `selecting()`, where nothing is lost if it is broken off.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
@@ -65,7 +67,7 @@ def run(
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
     _check_kind("decision_maker", decision_maker, DecisionMaker, "an instance of a subclass")
     if config.ask == "unsure" or config.question != "front":
-        decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question)
+        decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question, ask_now)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
     return _Run(config, environment, decision_maker, population, selecting).events(state)

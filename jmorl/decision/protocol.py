@@ -358,6 +358,10 @@ class DecisionMaker(ABC):
         """Return a further question about an answer just given, which then takes its place; None if there is none."""
         return None
 
+    def remembers(self, question: AnyQuestion) -> bool:
+        """Return whether this question was answered before, so that the answer is given again without asking."""
+        return False
+
     def compare(self, question: PairQuestion) -> int | None:
         """Return the id of the preferred one of two policies, or None for no difference; here: as `answer` has it."""
         unbounded = np.full(len(question.objectives), -np.inf)

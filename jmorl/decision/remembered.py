@@ -33,14 +33,16 @@ class Remembered(Wrapper):
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""
-        if self.records:
-            record = self.records.pop(0)
-            whole = question.whole if isinstance(question, Question) else question  # which somebody may have seen
-            if is_of(record, question) or is_of(record, whole):
-                return answer_in(record, question)
-            self.records.clear()
+        if self.remembers(question):
+            return answer_in(self.records.pop(0), question)
+        self.records.clear()
         with self.asking():
             return self.user.respond(question)
+
+    def remembers(self, question: AnyQuestion) -> bool:
+        """Return whether the next record is of this question."""
+        whole = question.whole if isinstance(question, Question) else question  # which somebody may have seen
+        return bool(self.records) and (is_of(self.records[0], question) or is_of(self.records[0], whole))
 
 
 def is_of(record: RunRecord, question: AnyQuestion) -> bool:

@@ -31,7 +31,8 @@ class StandIn(Wrapper):
     never is. With `shows` "few" it asks about few policies at a time: the best by expectation, the one that was chosen
     last, and those whose comparison tells most; with "rank" for their order; with "pair" about two, after which it goes
     on with the best by expectation. `history` has the records of a run that goes on; only what the user said themselves
-    counts. The same answers give the same posterior.
+    counts. The same answers give the same posterior. With `ask_now` it leaves the next question to the user, however
+    sure it is: so somebody takes back what it has answered.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class StandIn(Wrapper):
         history: Iterable[RunRecord] = (),
         ask: Ask = "unsure",
         shows: Shows = "front",
+        ask_now: bool = False,
     ):
         super().__init__(user)
         self.seed = seed
@@ -49,6 +51,7 @@ class StandIn(Wrapper):
         self.limits = next((each.answer.limits for each in reversed(own) if each.limits), None)
         self.ask = "always" if user.patient else ask
         self.shows = shows
+        self.ask_now = ask_now
 
     def decide(self, question: AnyQuestion) -> tuple[AnyQuestion, Any]:
         """Return the question as it was asked, and the answer.
@@ -63,10 +66,12 @@ class StandIn(Wrapper):
             return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
         model = self._model(question)
         verdict = model.verdict()
-        if self._is_sure(question, verdict):
+        asked = self._shortened(question, model, verdict)
+        if self._is_sure(question, verdict) and not self.ask_now and not self.user.remembers(asked):
             reason = f"the answers so far agree on it: expected regret {verdict.regret:.1%} of the range of utility"
             return question, Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
-        return self._asked(self._shortened(question, model, verdict))
+        self.ask_now = False
+        return self._asked(asked)
 
     def _asked(self, asked: Question) -> tuple[Question, Answer]:
         """Ask the user, and take note of what they say. Return the question as they saw it, and the answer."""

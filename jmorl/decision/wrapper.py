@@ -22,6 +22,10 @@ class Wrapper(DecisionMaker):
         """Return the user's further question about an answer."""
         return self.user.follow_up(question, answer)
 
+    def remembers(self, question: AnyQuestion) -> bool:
+        """Return whether the user has answered this question before."""
+        return self.user.remembers(question)
+
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
         answer: Answer = self.respond(question)

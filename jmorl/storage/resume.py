@@ -46,6 +46,7 @@ class Continued:
     state: RunState | None  # None: from the beginning
     notes: tuple[str, ...] = ()  # what somebody should know about it, sentences
     user: DecisionMaker | None = None  # who decides; None: as the config says
+    ask_now: bool = False  # the next question is not for a stand-in
 
     def events(
         self,
@@ -63,16 +64,18 @@ class Continued:
         user = user or self.user or make_user(config.user, environment.objectives)
         decisions = self.folder.decisions
         remembered = Remembered(user, [record for record in decisions.ahead if not by_stand_in(record)], asking)
-        for event in run(config, remembered, environment, self.state, population, decisions.answered, selecting):
+        answered = decisions.answered
+        for event in run(config, remembered, environment, self.state, population, answered, selecting, self.ask_now):
             self.folder.record(event)
             yield event
 
 
-def resume(path: Path | str, user: DecisionMaker | None = None) -> Continued:
+def resume(path: Path | str, user: DecisionMaker | None = None, ask_now: bool = False) -> Continued:
     """Take up a run from its last good checkpoint, or from the beginning if it has none yet.
 
     Logs that are ahead of the checkpoint are cut back to it, but answers are kept, and what a killed process left
-    half-written is deleted. `user` takes the place of the config's, who then need not be there any more. Raises
+    half-written is deleted. `user` takes the place of the config's, who then need not be there any more. With `ask_now`
+    they are asked the next question, however sure a stand-in is. Raises
     CannotContinue, FolderInUse, NewerFormat and NotAsDeclared, having changed nothing.
     """
     path = Path(path)
@@ -98,7 +101,7 @@ def resume(path: Path | str, user: DecisionMaker | None = None) -> Continued:
         folder = _opened(path, config, environment, lock, manifest)
         state = _restore(folder, found, notes)
         _note_resumption(folder, state, notes)
-        return Continued(folder, state, tuple(notes), user)
+        return Continued(folder, state, tuple(notes), user, ask_now)
 
 
 def branch(
@@ -129,7 +132,7 @@ def branch(
         folder.write_front(state.archive.members)
         folder.checkpoints.save(state, folder.logs())
         folder.checkpoints.wait()
-        return Continued(folder, state, tuple(notes), decision_maker)
+        return Continued(folder, state, tuple(notes), decision_maker, ask_now=True)
     except BaseException:
         folder.close()
         raise

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import envs
-from jmorl import Decided, DecisionMaker, PairQuestion, branch, read_run, run
+from jmorl import Decided, DecisionMaker, PairQuestion, branch, read_run, resume, run
 from jmorl.cli import main
 from jmorl.decision.protocol import Answer
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
@@ -78,6 +78,42 @@ def test_a_run_with_a_stand_in_is_resumed_to_the_same_result(whole, config, tmp_
     go_on(path, user=user)
     assert outcome(path) == outcome(whole)
     assert len(user.asked) < questions(whole) or events == 3
+
+
+def test_who_wants_to_be_asked_now_is_asked_once_and_never_again_the_same(whole, config, tmp_path):
+    """A stand-in's answer is taken back; the user's own in its place survives a run that is broken off after it."""
+    first = next(record for record in read_run(whole).decisions if record.stand_in)
+    path = tmp_path / "taken_back"
+    with branch(whole, first.generation - 1, path).folder:
+        pass
+    others = {shown.policy for shown in first.shown} - {first.policy}
+
+    class Other(Counting):
+        def answer(self, question):
+            self.asked.append(question)
+            return Answer(min(others))
+
+    user = Other(config)
+    continued = resume(path, user, ask_now=True)
+    with continued.folder:
+        for event in continued.events():
+            if isinstance(event, Decided):
+                break
+    assert len(user.asked) == 1 and event.chosen.id == min(others) and not event.answer.stand_in
+    later = Counting(config)
+    again = resume(path, later)
+    with again.folder:
+        taken = next(event for event in again.events() if isinstance(event, Decided))
+    assert taken.chosen.id == min(others) and not taken.answer.stand_in and not later.asked
+
+
+def test_a_branch_asks_at_once(whole, config, tmp_path):
+    first = next(record for record in read_run(whole).decisions if record.stand_in)
+    continued = branch(whole, first.generation - 1, tmp_path / "branch")
+    user = Counting(config)
+    with continued.folder:
+        decided = next(event for event in continued.events(user) if isinstance(event, Decided))
+    assert len(user.asked) == 1 and not decided.answer.stand_in
 
 
 @pytest.mark.parametrize("ask", ["unsure", "always"])
