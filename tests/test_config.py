@@ -58,6 +58,7 @@ OTHER = {
     "search.delta": 0.3,
     "search.least_slack": 0.05,
     "search.least_within": 3,
+    "search.patience": 3,
     "search.outside_share": 0.5,
     "search.optimism": 0.5,
     "search.bounds_scale": "one",

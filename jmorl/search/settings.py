@@ -21,7 +21,12 @@ class SearchConfig(Section):
     )
     least_within: Annotated[int, Field(ge=0)] = Field(
         6,
-        description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
+        description="interactive: while the choice stays, widen the bounds until so many of the buffer lie within; 0: "
+        "never (the paper)",
+    )
+    patience: Annotated[int, Field(ge=0)] = Field(
+        1,
+        description="interactive: generations with one choice, after which bounds give way and tasks go outside",
     )
     outside_share: Annotated[float, Field(ge=0, le=1)] = Field(
         0.17,
