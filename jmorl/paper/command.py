@@ -6,6 +6,7 @@ from pathlib import Path
 from jmorl.display.console import PlainConsole
 from jmorl.experiments.cells import Places, distinct, known
 from jmorl.experiments.progress import Part, make_all
+from jmorl.paper.by_default import study_runs
 from jmorl.paper.pilots import propose
 from jmorl.paper.plan import CHEETAH, ITEMS, NAMES, SHORTER, Plan, in_order, named
 from jmorl.paper.report import Scope, write_report
@@ -46,5 +47,7 @@ def make_paper(
         console.print(proposed, soft_wrap=True)
     if items:
         cells = distinct(cell for part in parts for cell in part.cells)
-        path = write_report(out, Scope(plan, items, units), known(cells, places))
+        path = write_report(
+            out, Scope(plan, items, units, study_runs(out.parent / "study" / "records")), known(cells, places)
+        )
         console.print(f"report: {path}", soft_wrap=True)

@@ -20,9 +20,10 @@ from jmorl.display.limits import core
 from jmorl.display.text import objective_label
 from jmorl.experiments.targets import TargetRow
 from jmorl.paper.analysis import Finals
+from jmorl.paper.by_default import BY_DEFAULT, StudyRuns, default_curves, default_targets
 from jmorl.paper.plan import NAMES, SHORTER, Item, Plan
 from jmorl.paper.results import Curves, Records, curves, final_policies, target_rows
-from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, legend_below, new_figure, style
+from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, RED, legend_below, new_figure, style
 from jmorl.storage.files import written_whole
 from jmorl.units import measured_in
 
@@ -30,6 +31,7 @@ LOOKS: dict[str, tuple[Any, ...]] = {  # colour, line, mark and name
     "interactive": (BLUE, "-", "o", "interactive"),
     "pgmorl": (ORANGE, "--", "s", "PGMORL"),
     SHORTER: (GREEN, ":", "D", "PGMORL, warm-up 40"),
+    BY_DEFAULT: (RED, "-.", "^", "interactive, by default"),
 }
 FORMATS = ("png", "svg")
 DOTS_PER_INCH = 300  # for print
@@ -37,12 +39,14 @@ WIDTH = 10.5  # inches, three panels
 STACK = 0.2  # of the distance of two lines
 
 
-def draw(folder: Path, plan: Plan, item: Item, units: Sequence[str], records: Records) -> dict[str, Path]:
+def draw(
+    folder: Path, plan: Plan, item: Item, units: Sequence[str], records: Records, study: StudyRuns
+) -> dict[str, Path]:
     """Draw an item in each kind of units it has runs in, as PNG and SVG. Returns the PNG of each."""
     drawn = {}
     with style():
         for each in units:
-            figure = _figure(plan, item, each, records)
+            figure = _figure(plan, item, each, records, study if each == "raw" else StudyRuns())
             if figure is not None:
                 drawn[each] = _save(figure, folder / f"{item.name}-{each}")
     return drawn
@@ -57,22 +61,29 @@ def _save(figure: Figure, path: Path) -> Path:
     return path.with_suffix(".png")
 
 
-def _figure(plan: Plan, item: Item, units: str, records: Records) -> Figure | None:
+def _figure(plan: Plan, item: Item, units: str, records: Records, study: StudyRuns) -> Figure | None:
     title = f"{NAMES[item.env]}, {units} units"
     if item.kind == "steps to targets":
-        rows = target_rows(plan, item, units, records)
+        rows = _beside(target_rows(plan, item, units, records), default_targets(plan, item, study))
         return targets_figure(rows, f"Steps until a target is reached: {title}") if rows else None
     if item.kind == "final policies":
         found = final_policies(plan, item, units, records)
         normalised = ", normalised utilities" if item.normalised else ""
         return finals_figure(found, item, units, f"Final policies: {title}{normalised}") if found else None
-    rows_of = curves(plan, item, units, records)
+    rows_of = [*curves(plan, item, units, records), *default_curves(plan, item, study)]
     what = (
         "Greatest utility of the archive"
         if item.kind == "greatest utility"
         else "Mean utility of the policies just trained"
     )
     return curves_figure(rows_of, item, units, f"{what}: {title}") if rows_of else None
+
+
+def _beside(rows: Sequence[TargetRow], ours: Sequence[TargetRow]) -> list[TargetRow]:
+    """Return all rows, those of each target together."""
+    return [
+        row for target in dict.fromkeys(row.target for row in rows) for row in (*rows, *ours) if row.target == target
+    ]
 
 
 def curves_figure(rows: Sequence[Curves], item: Item, units: str, title: str) -> Figure:

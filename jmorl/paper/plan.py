@@ -106,7 +106,7 @@ class Plan:
 
     def cells(self, item: Item, units: str) -> list[Cell]:
         """Return the runs that an item needs."""
-        goals = self._goals(item, units)
+        goals = self.goals(item, units)
         seeds = self.seeds_of(item)
         cells = [self.interactive(item, units, goal, seed) for goal in goals for seed in seeds]
         baselines = self.methods(item, units)[1:]
@@ -127,7 +127,7 @@ class Plan:
     def interactive(self, item: Item, units: str, goal: str, seed: int) -> Cell:
         """Return the interactive run for a user, or for a target."""
         to_target = item.kind == "steps to targets"
-        user = self._goals(item, units)[goal]
+        user = self.goals(item, units)[goal]
         name = "target" if to_target else "user" if user == goal else "normalised"
         return self._cell(item.env, units, "interactive", user, f"{name}-{goal}", seed, to_target)
 
@@ -155,7 +155,7 @@ class Plan:
             self.pgmorl(item, "raw", seed) for seed in seeds
         ]
 
-    def _goals(self, item: Item, units: str) -> dict[str, str]:
+    def goals(self, item: Item, units: str) -> dict[str, str]:
         """Return the decision maker, as a config has it, of each user or target by name."""
         if item.kind == "steps to targets":
             unscaled = ",unscaled" if units == "paper" else ""

@@ -8,6 +8,7 @@ from jmorl.experiments import tables
 from jmorl.experiments.targets import TargetRow
 from jmorl.paper import claims, markdown
 from jmorl.paper.acceptance import ACCEPTANCE_CRITERION, acceptance_verdict, drift_told, explanations
+from jmorl.paper.by_default import StudyRuns, curves_section, default_curves, default_targets, targets_section
 from jmorl.paper.data import PublishedTable, honest, published
 from jmorl.paper.figures import draw
 from jmorl.paper.introduction import DEVIATIONS, DIFFERENT_UNITS, INTRODUCTION, MEAN_UTILITY, POOLED, SWAPPED
@@ -32,6 +33,7 @@ class Scope:
     plan: Plan
     items: Sequence[Item]
     units: Sequence[str]
+    study: StudyRuns = StudyRuns()  # of the search by default
 
 
 def write_report(folder: Path, scope: Scope, records: Records) -> Path:
@@ -39,7 +41,7 @@ def write_report(folder: Path, scope: Scope, records: Records) -> Path:
     sections = [f"# The paper's experiments{', at a reduced size' if scope.plan.quick else ''}", INTRODUCTION]
     sections.append(state(scope.plan, scope.items, scope.units, records))
     for item in scope.items:
-        drawn = draw(folder / "figures", scope.plan, item, scope.units, records)
+        drawn = draw(folder / "figures", scope.plan, item, scope.units, records, scope.study)
         pictures = [f"![{item.name}, {units} units](figures/{path.name})" for units, path in drawn.items()]
         sections += [_heading(item), *_section(scope, item, records), *pictures]
     path = folder / "REPORT.md"
@@ -57,11 +59,15 @@ def _heading(item: Item) -> str:
 def _section(scope: Scope, item: Item, records: Records) -> list[str]:
     if item.kind == "steps to targets":
         rows = {units: target_rows(scope.plan, item, units, records) for units in scope.units}
-        return _table_section(published().tables[item.name], item, {u: each for u, each in rows.items() if each})
+        parts = _table_section(published().tables[item.name], item, {u: each for u, each in rows.items() if each})
+        return parts + targets_section(default_targets(scope.plan, item, scope.study), rows.get("raw", []))
     parts = [f"The paper: {published().claims[item.name].text}", MEAN_UTILITY if item.kind == "mean utility" else ""]
     for units in scope.units:
         make = _finals_part if item.kind == "final policies" else _curves_part
         parts += make(scope.plan, item, units, records)
+    if item.kind != "final policies" and "raw" in scope.units:
+        others = curves(scope.plan, item, "raw", records)
+        parts += curves_section(default_curves(scope.plan, item, scope.study), others)
     return parts
 
 

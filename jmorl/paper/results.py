@@ -93,13 +93,14 @@ def curves(plan: Plan, item: Item, units: str, records: Records) -> list[Curves]
             there = _there(plan, item, units, method, user, records)
             whole = {seed: record for seed, record in there.items() if record.fault is None}
             if whole:
-                found.append(_curves(user, method, whole, weights, item, plan.steps(item)))
+                found.append(curves_of(user, method, whole, weights, item, plan.steps(item)))
     return found
 
 
-def _curves(
+def curves_of(
     user: str, method: str, runs: Mapping[int, RunRecord], weights: Sequence[float], item: Item, steps: int
 ) -> Curves:
+    """Return the curve of at least one run, none of which broke down."""
     some = tuple(runs.values())
     buffer = bounded = None
     if item.kind == "greatest utility":
