@@ -51,7 +51,6 @@ BASELINE: Mapping[str, Any] = {
     "search.bounds_scale": "range",
     "search.least_slack": 0.0,
     "search.least_within": 0,
-    "search.patience": 1,
     "search.outside_share": 0.0,
     "search.optimism": 0.0,
     "search.gain_within": "bounds",
@@ -72,7 +71,6 @@ ADDED_SINCE_FORMAT_1 = frozenset(
         "population.weights",
         "search.least_slack",
         "search.least_within",
-        "search.patience",
         "search.outside_share",
         "search.optimism",
     }

@@ -15,6 +15,8 @@ from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Policy, values_of
 from jmorl.state import RunState
 
+PATIENCE = 2  # generations with one choice, after which the search has stagnated
+
 
 class Interactive(PGMORL):
     """Ask before each generation which policy is preferred, and search where none is much worse."""
@@ -31,8 +33,8 @@ class Interactive(PGMORL):
 
     def tasks(self, run: RunState) -> Tasks:
         """Return tasks within the bounds; while the same policy stays preferred, some of them anywhere."""
-        share = self.problem.search.outside_share if self._stagnates(run.search) else 0.0
-        outside = round(share * self.problem.agents)
+        stays = run.search.generations_with_choice >= PATIENCE
+        outside = round(self.problem.search.outside_share * self.problem.agents) if stays else 0
         if not outside:
             return super().tasks(run)
         generator = np.random.default_rng([self.problem.seed, run.generation])
@@ -114,10 +116,6 @@ class Interactive(PGMORL):
         """Return PGMORL's metrics, and how often the slack of the bounds was doubled."""
         return {**super().metrics(run, utility, offspring, tasks), "widenings": run.search.widenings}
 
-    def _stagnates(self, state: PGMORLState) -> bool:
-        """Return whether the same policy has stayed preferred."""
-        return state.generations_with_choice >= self.problem.search.patience
-
     def _bounded(self, run: RunState, state: PGMORLState, chosen: Policy) -> PGMORLState:
         """Return the state with the bounds that follow from a choice (the paper's equation 4), widened if need be.
 
@@ -131,7 +129,7 @@ class Interactive(PGMORL):
             spans if search.bounds_scale == "range" else np.ones_like(spans),
             search.least_slack * spans,
             values_of(state.buffer.members),
-            search.least_within if self._stagnates(state) else 0,
+            search.least_within,
             state.limits,
         )
         return replace(state, bounds=bounds.lower, widenings=bounds.widenings)

@@ -14,7 +14,7 @@ from jmorl.paper.results import Curves, advantage, curves_of
 BY_DEFAULT = "by default"  # the name of the method
 INTRODUCTION = (
     "### The search by default\n\nThe interactive method above follows the paper's rule. By default its bounds give "
-    "way, and users are asked only where their answers so far leave a doubt; targets are asked before every generation. "
+    "way, and users are asked only where their answers so far leave a doubt; targets decide before every generation. "
     "The same seeds, from the runs of `jmorl study benchmarks/study/plan.toml`:"
 )
 

@@ -20,13 +20,8 @@ class SearchConfig(Section):
         0.02, description="slack of the bounds at least, as a share of the archive's range; 0: none (the paper)"
     )
     least_within: Annotated[int, Field(ge=0)] = Field(
-        6,
-        description="interactive: while the choice stays, widen the bounds until so many of the buffer lie within; 0: "
-        "never (the paper)",
-    )
-    patience: Annotated[int, Field(ge=0)] = Field(
-        1,
-        description="interactive: generations with one choice, after which bounds give way and tasks go outside",
+        3,
+        description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
     )
     outside_share: Annotated[float, Field(ge=0, le=1)] = Field(
         0.17,
