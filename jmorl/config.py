@@ -75,12 +75,13 @@ class Config(Section):
     env: str = Field("mo-mountaincarcontinuous-v0", description="environment id, `ID,option=value`; see `jmorl envs`")
     method: str = Field(
         "interactive",
-        description="how policies are searched for: interactive (ask every generation), pgmorl (ask only at the end), "
+        description="how policies are searched for: interactive (ask between generations), pgmorl (ask at the end), "
         "fixed (each agent keeps its weights), or MODULE:NAME of your own",
     )
     user: str = Field(
         "A",
-        description="who decides: A, B, C, weights=0.6,0.4[,chebyshev], target=-80,-42, terminal, script=FILE",
+        description="who decides: A, B, C, weights=0.6,0.4[,chebyshev or concave=...], target=-80,-42, terminal, "
+        "script=FILE; artificial ones may err (A,random=0.2), change their mind, or have limits: see the README",
     )
     ask: Literal["always", "unsure"] = Field(
         "unsure", description="whom: the user always, or only where their answers so far leave open what they prefer"

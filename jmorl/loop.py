@@ -263,6 +263,7 @@ class _Run:
     ) -> GenerationFinished:
         """Train agents [P] with weights [P, M], evaluate them, and take them in."""
         started = time.perf_counter()
+        in_force = self.method.bounds(state.search)
         key = _training_key(self.config, state.generation)
         train_states, diagnostics = self.population.train(
             train_states, weights, key, iterations, self.config.learning_rate(state.iterations)
@@ -284,7 +285,7 @@ class _Run:
             front_metrics(state.archive.values, reference_point(state), self.metric_weights),
             None if utilities is None else float(utilities.max()),
             self.method.metrics(state, self.decision_maker.utility, offspring, tasks),
-            self.method.bounds(state.search),
+            in_force,
             self.method.generations_to_question(state.search),
         )
 

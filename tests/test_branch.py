@@ -28,7 +28,7 @@ def test_a_branch_shares_the_past_and_decides_for_itself(whole, tmp_path):
         assert lines[0][: rows + 1] == lines[1][: rows + 1] and lines[0] != lines[1]
     manifest = json.loads((path / "manifest.json").read_text())
     parent = json.loads((whole / "manifest.json").read_text())["run"]
-    assert manifest["parent"] == {"run": parent, "name": "whole", "generation": 1}
+    assert manifest["parent"] == {"run": parent, "name": "whole", "generation": 1, "another_user": True}
     assert manifest["run"] != parent
 
 

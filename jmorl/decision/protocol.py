@@ -129,6 +129,10 @@ class Question(AnyQuestion):
                 replace(self, others=()).policy(each)
         except ValueError as error:
             raise AnswerError(str(error)) from None
+        if answer.ranking and self.form != "pair" and answer.ranking[0] != answer.policy:
+            raise AnswerError(
+                f"the ranking must begin with the preferred policy {answer.policy}: {list(answer.ranking)}"
+            )
         if answer.limits is not None and len(answer.limits) != len(self.objectives):
             raise AnswerError(f"limits must be {len(self.objectives)} numbers, not {_shortly(answer.limits)}")
         return answer

@@ -11,6 +11,7 @@ from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Form, Qu
 from jmorl.decision.records import DecisionRecord, decision_record
 from jmorl.decision.remembered import RunRecord, by_stand_in
 from jmorl.decision.wrapper import Wrapper
+from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
 
 Ask = Literal["always", "unsure"]
@@ -62,7 +63,7 @@ class StandIn(Wrapper):
             return question, self.user.respond(question)
         if question.again:
             return self._asked(question)
-        if len(question.front) == 1 and self.ask == "unsure":
+        if len(question.front) == 1 and self.ask == "unsure" and self._reachable(question):
             return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
         model = self._model(question)
         verdict = model.verdict()
@@ -115,8 +116,13 @@ class StandIn(Wrapper):
         return PreferenceModel(question.values, self.answers, self.seed, question.generation, limits)
 
     def _is_sure(self, question: Question, verdict: Verdict) -> bool:
-        """Return whether the user's earlier answers leave little doubt."""
-        return self.ask == "unsure" and bool(self.answers) and verdict.regret <= TRUSTED_REGRET[question.purpose]
+        """Return whether the user's earlier answers leave little doubt. Where nothing reaches their limits they do."""
+        trusted = bool(self.answers) and verdict.regret <= TRUSTED_REGRET[question.purpose]
+        return self.ask == "unsure" and trusted and self._reachable(question)
+
+    def _reachable(self, question: Question) -> bool:
+        """Return whether a policy reaches the user's limits."""
+        return self.limits is None or bool(within(question.values, np.array(self.limits)).any())
 
     def _shortened(self, question: Question, model: PreferenceModel, verdict: Verdict) -> Question:
         """Return the question in the form wanted, about a few policies; the others may be chosen, too."""

@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from envs.core import Objective
 from jmorl.decision.protocol import (
     Adjust,
@@ -24,7 +26,8 @@ POLICY_HELP = """\
   Enter        keep your last choice: none of these is better
   12 4 9       prefer policy 12, then 4, then 9, to all others
   same         no difference between these
-  {limit:<12} from now on, rule out what does not reach this; none instead of a number: anything will do
+  {limit}
+               rule out what does not reach this; none takes it back
   {more:<12} list the policies with the most of an objective first
   all          list every policy, where only some are shown; the others can be chosen, too
   12 go 5      choose policy 12, then no question for 5 generations (or go 5)
@@ -105,8 +108,9 @@ def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, .
     """
     words = line.lower().split()
     name = question.objectives[-1].name
+    middle = f"{float(np.median(question.values[:, -1])):.3g}"
     if words[:1] in (["?"], ["help"]):
-        return POLICY_HELP.format(more=f"more {name}", limit=f"limit {name} 5")
+        return POLICY_HELP.format(more=f"more {name}", limit=f"limit {name} {middle}")
     if words[:1] == ["more"]:
         return _objective(question.objectives, " ".join(words[1:]))
     if words[:1] == ["limit"]:
@@ -177,7 +181,7 @@ def _policy(question: Question, named: str | None) -> int | str:
     if number is None:
         return f"I do not understand {named!r}; {hint}."
     if number not in ids:
-        return f"There is no policy {number} in this front; it has {', '.join(map(str, sorted(ids)))}."
+        return f"There is no policy {number}. You can choose from: {', '.join(map(str, sorted(ids)))}."
     return number
 
 
@@ -196,7 +200,7 @@ def _ranking(question: Question, words: list[str]) -> tuple[int, ...] | str:
         return "Name each policy once, from the best down."
     strange = [str(each) for each in ids if each not in shown]
     if strange:
-        return f"Only the policies shown can be put in order, and {', '.join(strange)} is not among them."
+        return f"Only the policies shown can be put in order. Not shown: {', '.join(strange)}."
     return tuple(ids)
 
 
@@ -205,8 +209,12 @@ def _limits(question: Question, words: list[str]) -> tuple[float, ...] | str:
     *named, value = words or [""]
     index = _objective(question.objectives, " ".join(named)) if named else ""
     if isinstance(index, str):
-        name = question.objectives[-1].name
-        return f"Name an objective and what it must reach, for example: limit {name} 5; or: limit {name} none"
+        name, middle = question.objectives[-1].name, float(np.median(question.values[:, -1]))
+        names = ", ".join(objective.name for objective in question.objectives)
+        return (
+            f"Name an objective ({names}) and what it must reach, for example: limit {name} {middle:.3g}; or: limit "
+            f"{name} none"
+        )
     try:
         limit = -math.inf if value == "none" else float(value)
     except ValueError:

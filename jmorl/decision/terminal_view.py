@@ -10,6 +10,7 @@ from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_scatter, front_table, stacked_label
 from jmorl.display.tables import PlainTable
 from jmorl.display.text import front_question, number_format, plural
+from jmorl.search.bounds import within
 
 PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
@@ -25,12 +26,31 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
         bounds=question.bounds,
         limits=question.limits,
     )
+    told = limits_in_words(question)
+    if told:
+        heading += f"\n{told}"
     if question.others:
-        heading += f" (all lists {plural(len(question.others), 'other')}.)"
+        heading += f"\nType all to see {len(question.others)} more."
     _show(console, heading, table)
     chosen = [policy.values for policy in question.front if policy.id == question.previous]
     marks, legend = ({"x": chosen[0]}, "o: a policy, x: your last choice") if chosen else ({}, "o: a policy")
     show_plot(console, question.objectives, question.values, marks, legend)
+
+
+def limits_in_words(question: Question) -> str:
+    """Say which limits there are, and how many of the policies shown reach them; nothing without a limit."""
+    limits = np.array(question.limits or ())
+    if not np.isfinite(limits).any():
+        return ""
+    named = ", ".join(
+        f"{objective.label} ≥ {limit:g}"
+        for objective, limit in zip(question.objectives, limits, strict=True)
+        if np.isfinite(limit)
+    )
+    count = int(within(question.values, limits).sum())
+    if count:
+        return f"Your limits: {named}. {count} of these {len(question.front)} reach them."
+    return f"Your limits: {named}. None of these reaches them; limit NAME none takes one back."
 
 
 def show_points(console: PlainConsole, question: PointQuestion) -> None:

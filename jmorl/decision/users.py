@@ -154,7 +154,9 @@ def _shape(options: Mapping[str, str], count: int) -> Callable[[list[float]], Ut
         return partial(chebyshev_utility, utopian=utopian)
     if "concave" not in options:
         return linear_utility
-    points = _numbers(options["concave"], "concave", 2 * count)
+    points = _numbers(options["concave"], "concave", None)
+    if len(points) != 2 * count:
+        raise ValueError(f"concave needs two numbers for each of {count} objectives, {OPTIONS['concave']}")
     worst, best = points[:count], points[count:]
     if not all(low < high for low, high in zip(worst, best, strict=True)):
         raise ValueError(f"concave has the worst value of each objective first, then better ones: {options['concave']}")
@@ -175,6 +177,10 @@ def _weights(listed: str, name: str, count: int | None) -> list[float]:
 def _limits(listed: str, count: int) -> list[float]:
     """Return limits, -inf for each `none`."""
     words = [word.strip() for word in listed.split(",")]
+    if len(words) != count:
+        raise ValueError(
+            f"limits must have a number or none for each of {count} objectives, not {len(words)}: {listed}"
+        )
     numbers = iter(_numbers(",".join("0" if word == "none" else word for word in words), "limits", count))
     return [-math.inf if word == "none" else number for word, number in zip(words, numbers, strict=True)]
 

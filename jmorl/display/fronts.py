@@ -47,10 +47,15 @@ def front_table(
             *(column[index] for column in scores),
             " ".join(f"{weight:.2g}" for weight in policy.weights),
             str(policy.generation),
-            notes.get(True, "" if bounded[index] else "outside the bounds") if good[index] else "beyond your limits",
+            ", ".join(filter(None, [notes.get(True), _outside(bool(bounded[index]), bool(good[index]))])),
             style="bold" if policy.id == chosen_id else None if bounded[index] and good[index] else "dim",
         )
     return table
+
+
+def _outside(bounded: bool, good: bool) -> str:
+    """Say what a policy does not reach."""
+    return "beyond your limits" if not good else "" if bounded else "outside the bounds"
 
 
 def front_scatter(

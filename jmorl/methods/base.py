@@ -147,6 +147,10 @@ class Method(ABC, Generic[SearchState]):
         """Return the state in which the next question, if there are any, comes before the next generation."""
         return state
 
+    def with_another_user(self, state: SearchState) -> SearchState:
+        """Return the state without what the decision maker has set, for somebody else."""
+        return state
+
     def final_front(self, run: RunState) -> Sequence[Policy]:
         """Return the policies, at least one, among which the run's result is chosen."""
         return run.archive.members

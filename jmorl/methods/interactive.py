@@ -68,6 +68,10 @@ class Interactive(PGMORL):
         """Return the state without generations to go on for in silence."""
         return replace(state, silent_generations=0)
 
+    def with_another_user(self, state: PGMORLState) -> PGMORLState:
+        """Return the state without limits."""
+        return replace(state, limits=None)
+
     def candidates(self, run: RunState) -> list[Policy]:
         """Return the choice, always, and the buffer members within the bounds."""
         inside = members_within(run.search.buffer.members, run.search.bounds)
@@ -76,14 +80,15 @@ class Interactive(PGMORL):
     def taken_in(self, run: RunState, offspring: Sequence[Policy], tasks: Any) -> PGMORLState:
         """Return the state with the offspring, one generation nearer to the next question.
 
-        Bounds that give way do so anew: the offspring may lie within them.
+        Where no question follows, bounds that give way do so anew: the offspring may lie within them.
         """
         state = super().taken_in(run, offspring, tasks)
         state = replace(state, silent_generations=max(state.silent_generations - 1, 0))
         if run.choice is None:
             return state
         state = replace(state, generations_with_choice=state.generations_with_choice + 1)
-        return self._bounded(run, state, run.choice) if self.problem.search.least_within else state
+        in_silence = state.silent_generations > 0 and self.problem.search.least_within > 0
+        return self._bounded(run, state, run.choice) if in_silence else state
 
     def final_front(self, run: RunState) -> Sequence[Policy]:
         """Return the members of the archive within the bounds; if some reach the limits, no others."""

@@ -64,7 +64,9 @@ class Continued:
         user = user or self.user or make_user(config.user, environment.objectives)
         decisions = self.folder.decisions
         remembered = Remembered(user, [record for record in decisions.ahead if not by_stand_in(record)], asking)
-        answered = decisions.answered
+        parent = self.folder.manifest["parent"] or {}
+        before = parent.get("generation", 0) if parent.get("another_user") else 0  # what somebody else has said
+        answered = [record for record in decisions.answered if record.generation > before]
         for event in run(config, remembered, environment, self.state, population, answered, selecting, self.ask_now):
             self.folder.record(event)
             yield event
@@ -120,8 +122,11 @@ def branch(
     _refuse_to_rescale(path, manifest, environment)
     decision_maker = _new_user(config, environment)
     checkpoint, state = state_after(path, generation, manifest, config, environment)
-    state = replace(state, search=make_method(config, environment).asking_at_once(state.search))
+    method = make_method(config, environment)
+    search = method.asking_at_once(state.search)
+    state = replace(state, search=method.with_another_user(search) if user else search)
     parent = {"run": manifest["run"], "name": path.resolve().name, "generation": generation}
+    parent |= {"another_user": True} if user else {}
     check_free(out, force)
     if out.resolve() in (path.resolve(), *path.resolve().parents):
         raise FolderInUse(f"{out} holds the run that is branched off; choose another folder")

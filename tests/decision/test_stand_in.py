@@ -548,3 +548,27 @@ def test_a_run_that_was_broken_off_between_two_answers_goes_on_with_the_second(c
     user.asked, user.wrong = [()] * 3, records[again].policy
     go_on(path, user=user)
     assert outcome(path) == outcome(whole)
+
+
+def test_where_nothing_reaches_the_limits_the_user_is_asked(growing):
+    """However often they have answered: what they want is not there."""
+
+    def says(question):
+        return Answer(question.front[0].id, limits=(1e6, -np.inf))
+
+    user = Says(says)
+    decided, _ = live(StandIn(user, 1), growing(8))
+    assert len(user.questions) >= 8 and not any(answer.stand_in for _, answer in decided)
+
+
+def test_another_user_of_a_branch_is_not_taken_for_the_first_one(whole, config, tmp_path):
+    """Neither are earlier answers theirs, nor after the branch was broken off and resumed."""
+    first = next(record for record in read_run(whole).decisions if record.stand_in)
+    answered = []
+    for name, spec in (("same", None), ("other", "weights=0,0,1")):
+        with branch(whole, first.generation - 1, tmp_path / name, spec).folder:
+            pass
+        continued = resume(tmp_path / name)
+        with continued.folder:
+            answered.append(next(event.answer for event in continued.events() if isinstance(event, Decided)))
+    assert [answer.stand_in for answer in answered] == [True, False]

@@ -16,7 +16,7 @@ from jmorl.display.console import PlainConsole
 
 # Policies 10, 11, 12 in the tests below.
 VALUES = [[-70, -40], [-66.25, -57], [-100, -20]]
-LIMIT = "Name an objective and what it must reach, for example: limit fuel 5; or: limit fuel none"
+LIMIT = "Name an objective (time, fuel) and what it must reach, for example: limit fuel -40; or: limit fuel none"
 HAND = np.array([[0, 12], [1, 11], [2, 10], [10, 4], [11, 3], [12, 0]], float)
 
 
@@ -91,14 +91,14 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        ("99", "There is no policy 99 in this front; it has 10, 11, 12."),
+        ("99", "There is no policy 99. You can choose from: 10, 11, 12."),
         ("1" * 5000, "choose a policy by its number, for example 10"),
         ("-1", "I do not understand '-1'; choose a policy by its number"),
         ("12.0", "I do not understand '12.0'"),
         ("[/red]", "I do not understand '[/red]'"),
         ("12 please", "I do not understand '12 please'; ? lists what you can type."),
         ("12 12", "Name each policy once, from the best down."),
-        ("12 99 98", "Only the policies shown can be put in order, and 99, 98 is not among them."),
+        ("12 99 98", "Only the policies shown can be put in order. Not shown: 99, 98."),
         ("12 10 now", "I do not understand '12 10 now'"),
         ("same same", "I do not understand 'same'"),
         ("12 10 go", "Say for how many generations"),
@@ -166,7 +166,7 @@ def test_help(ask, line):
         "  Enter        keep your last choice: none of these is better\n",
         "  12 4 9       prefer policy 12, then 4, then 9, to all others\n",
         "  same         no difference between these\n",
-        "  limit fuel 5 from now on, rule out what does not reach this",
+        "  limit fuel -40\n               rule out what does not reach this; none takes it back\n",
         "  more fuel    list the policies with the most of an objective first\n",
         "  12 go 5      choose policy 12, then no question for 5 generations (or go 5)\n",
         "  12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)\n",
@@ -206,7 +206,7 @@ def test_all_lists_the_policies_that_a_short_question_leaves_out(ask):
     session = Session("all", "12")
     assert session.user.answer(short) == Answer(12)
     before, after = session.output.split("12 ", 1)[0], session.output
-    assert "(all lists 1 other.)" in before and "-20.0" not in before and "-20.0" in after
+    assert "Type all to see 1 more." in before and "-20.0" not in before and "-20.0" in after
     assert Session("12").user.answer(short) == Answer(12)
 
 
@@ -215,7 +215,7 @@ def test_only_what_is_shown_can_be_ranked_until_all_are(ask):
     short = replace(question, front=question.front[:2], others=question.front[2:])
     session = Session("12 10", "all", "12 10")
     assert session.user.answer(short) == Answer(12, ranking=(12, 10))
-    assert session.sentences.count("Only the policies shown can be put in order, and 12 is not among them.") == 1
+    assert session.sentences.count("Only the policies shown can be put in order. Not shown: 12.") == 1
 
 
 @pytest.mark.parametrize("previous", [None, 9])

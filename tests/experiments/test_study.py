@@ -115,7 +115,7 @@ def test_a_whole_study(plan, capsys):
     report = make_study(plan, work=plan.parent / "work")
     text = report.read_text(encoding="utf-8")
     assert report == plan.parent / "REPORT.md" and "from 6 of 6 runs, with the seeds 1, 2" in text
-    assert "| all alike | interactive |" in text and "| all alike | PGMORL | 1, at the end |" in text
+    assert "| all alike | interactive | 2 |" in text and "| all alike | PGMORL | 2 | 1, at the end |" in text
     assert "| far away | interactive |" in text and "0 of 2" in text
     for figure in ("three_ways-questions", "three_ways-targets"):
         assert (plan.parent / "figures" / f"{figure}.png").stat().st_size > 10_000
@@ -127,6 +127,11 @@ def test_a_whole_study(plan, capsys):
     make_study(plan, work=plan.parent / "work")
     assert capsys.readouterr().out.startswith("three ways: done")
     assert report.read_text(encoding="utf-8") == text
+
+
+def test_a_report_of_no_runs_says_so(plan):
+    make_study(plan, run=False)
+    assert "There are no runs yet." in (plan.parent / "REPORT.md").read_text(encoding="utf-8")
 
 
 def test_runs_of_other_comparisons_are_taken(plan):
@@ -155,6 +160,7 @@ def test_runs_of_other_comparisons_are_taken(plan):
         ("[parts.users]", 'contenders = ["nobody"]\n[parts.users]', "there is no contender 'nobody'"),
         ("[parts.users]", 'best = "nowhere.json"\n[parts.users]', "there is no file"),
         ("[parts.users]", "[parts.user]", "parts.0.users: Field required"),
+        ("seeds = [1, 2]", "seeds = [1, 2]\nsed = 3", "sed: Unexpected keyword argument"),
     ],
 )
 def test_what_is_wrong_with_a_plan_is_said_before_anything_is_made(plan, before, after, problem):

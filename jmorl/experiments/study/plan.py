@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 import envs
 from jmorl.config import Config, ConfigError, resolve
@@ -44,6 +44,8 @@ EVERYBODY = "everybody"  # whose run it is that serves all users
 class StudyPart:
     """The runs in one environment, with one budget."""
 
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
     name: str
     env: str
     steps: int
@@ -55,6 +57,8 @@ class StudyPart:
 @dataclass(frozen=True)
 class Study:
     """Users, contenders and seeds."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
     seeds: tuple[int, ...]
     contenders: dict[str, dict[str, Any]]  # name -> settings

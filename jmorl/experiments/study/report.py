@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from jmorl.display.text import plural
 from jmorl.experiments import tables
-from jmorl.experiments.statistics import Times
+from jmorl.experiments.statistics import FEWEST, Difference, Times
 from jmorl.experiments.study.figures import draw
 from jmorl.experiments.study.plan import Study, StudyPart
 from jmorl.experiments.study.results import (
@@ -57,7 +58,7 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
     if users:
         best = "on the exact front" if part.best else "that any run found"
         yield (
-            "Questions: median, with the least and the most. Policies shown: in all questions of a run, on average. "
+            "Questions, the last one included: median, least and most. Policies shown: in all questions, on average. "
             f"Shortfall: how far the result's utility is below the best {best}, in percent: mean and worst. "
             f"Good: runs within {GOOD:g} %. Steps until the archive has a policy within {CLOSE:g} and {VERY_CLOSE:g} % "
             "of the best: mean, a run that never has one counting as the budget, and how many have one."
@@ -74,11 +75,11 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
 
 
 def _user_table(rows: Sequence[UserRow]) -> str:
-    head = ["user", "method", "questions", "policies shown", "utility", "shortfall %", "good"]
+    head = ["user", "method", "runs", "questions", "policies shown", "utility", "shortfall %", "good"]
     head += [f"million steps to {each:g} %" for each in (CLOSE, VERY_CLOSE)]
     lines = [
         [
-            *(row.user, row.method),
+            *(row.user, row.method, str(len(row.seeds))),
             f"{np.median(row.asked):g} ({row.asked.min()} to {row.asked.max()})" if row.asks else "1, at the end",
             f"{row.shown.mean():.0f}",
             f"{row.utility.mean():.4g}",
@@ -92,7 +93,8 @@ def _user_table(rows: Sequence[UserRow]) -> str:
 
 
 def _times(times: Times) -> str:
-    return f"{np.mean(times.restricted) / 1e6:.2f}, {share(times.successes, len(times.reached))}"
+    reached = share(times.successes, len(times.reached))
+    return f"{'≥ ' * (not times.successes)}{np.mean(times.restricted) / 1e6:.2f}, {reached}"
 
 
 def _gains(rows: Sequence[UserRow], methods: Sequence[str]) -> str:
@@ -104,13 +106,26 @@ def _gains(rows: Sequence[UserRow], methods: Sequence[str]) -> str:
         cells = [user]
         for other in methods[1:]:
             found = gained(of_user[first], of_user[other]) if {first, other} <= of_user.keys() else None
-            cells.append(f"{found.mean:+.3g} [{found.low:+.3g}, {found.high:+.3g}]" if found else "")
+            cells.append(_gain(found) if found else "")
         lines.append(cells)
     return table(["user", *(f"{first} against {other}" for other in methods[1:])], lines)
 
 
+def _gain(found: Difference) -> str:
+    """Write a gain, with an interval where there are runs enough for one."""
+    if found.count < FEWEST:
+        return f"{found.mean:+.3g} (of {plural(found.count, 'seed')})"
+    return f"{found.mean:+.3g} [{found.low:+.3g}, {found.high:+.3g}]{', clear' if found.clear else ''}"
+
+
 def _calibrations(study: Study, part: StudyPart, records: Records) -> str:
-    head = ["method", "values forecast", "in their 80 % intervals", "results confirmed", "within the stated error"]
+    head = [
+        "method",
+        "values forecast",
+        "in their 80 % intervals",
+        "results confirmed",
+        "within the stated error (99 of 100)",
+    ]
     lines = []
     for method in study.contenders_of(part):
         keys = dict.fromkeys(study.cell(part, method, user, seed).key for user in part.users for seed in study.seeds)

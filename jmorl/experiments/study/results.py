@@ -55,11 +55,11 @@ def user_rows(study: Study, part: StudyPart, records: Records) -> list[UserRow]:
         judge = study.user(part, user)
         if isinstance(judge, TargetUser):
             continue
-        best = _best(study, part, judge, records)
-        for method in study.contenders_of(part):
-            there = _runs(study, part, method, user, records)
-            if there:
-                rows.append(_user_row(study, part, user, method, judge, best, there))
+        runs = {method: _runs(study, part, method, user, records) for method in study.contenders_of(part)}
+        if any(runs.values()):
+            best = _best(study, part, judge, records)
+            made = ((method, there) for method, there in runs.items() if there)
+            rows += [_user_row(study, part, user, method, judge, best, there) for method, there in made]
     return rows
 
 
