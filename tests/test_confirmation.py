@@ -126,8 +126,8 @@ def test_people_are_told(folder, events, config, capsys):
     for table in run_tables(read_run(folder)):
         console.print(table)
     told = capsys.readouterr().out
-    assert "on 8 fresh episodes; " in told and " in the search" in told
+    assert "on 8 fresh episodes, 99 % sure; " in told and " in the search" in told
     from jmorl.display.console import PlainConsole
 
     watcher("lines", config, envs.make(config.env).objectives, PlainConsole()).show(events[-1])
-    assert "on 8 fresh episodes; " in capsys.readouterr().out
+    assert "on 8 fresh episodes, 99 % sure; " in capsys.readouterr().out

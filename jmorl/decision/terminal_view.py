@@ -26,6 +26,9 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
         bounds=question.bounds,
         limits=question.limits,
     )
+    fresh = next((policy.confirmation.episodes for policy in question.front if policy.confirmation), 0)
+    if fresh:
+        heading += f"\nThese scores are new, from {plural(fresh, 'fresh episode')}."
     told = limits_in_words(question)
     if told:
         heading += f"\n{told}"

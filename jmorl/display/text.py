@@ -87,7 +87,7 @@ def objective_label(objective: Objective) -> str:
 
 
 def confirmed_in_words(policy: Policy, objectives: Sequence[Objective]) -> str:
-    """`time -58.2 ±0.4, ... on 128 fresh episodes; time -57.9, ... in the search`; nothing if it is not confirmed."""
+    """`time -58.2 ±0.4, ... on 128 fresh episodes, 99 % sure; time -57.9, ... in the search`; or nothing."""
     found = policy.confirmation
     if found is None:
         return ""
@@ -97,7 +97,7 @@ def confirmed_in_words(policy: Policy, objectives: Sequence[Objective]) -> str:
         for objective, value, error, fmt in zip(objectives, policy.values, found.error, formats, strict=True)
     )
     claimed = values_in_words(found.claimed, objectives, formats)
-    return f"{scores} on {found.episodes} fresh episodes; {claimed} in the search"
+    return f"{scores} on {found.episodes} fresh episodes, 99 % sure; {claimed} in the search"
 
 
 def values_in_words(

@@ -191,3 +191,10 @@ def test_points_are_checked_too():
         PointQuestion.checked(Three(), Choose(3))
     with pytest.raises(AnswerError, match="choose_point must return Choose, Back or Adjust, not 1"):
         PointQuestion.checked(Three(), 1)
+
+
+def test_a_ranking_begins_with_the_preferred_policy():
+    question = Question("steer", 1, OBJECTIVES, (policy(3, 1, 2), policy(4, 2, 1)), np.full(2, -np.inf), None)
+    assert question.checked(Answer(4, ranking=(4, 3))).ranking == (4, 3)
+    with pytest.raises(AnswerError, match="the ranking must begin with"):
+        question.checked(Answer(4, ranking=(3, 4)))

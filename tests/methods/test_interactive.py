@@ -54,6 +54,12 @@ def test_the_papers_bounds_never_give_way(small_config):
             assert event.search["widenings"] == 0
 
 
+def test_what_is_told_of_a_generation_are_the_bounds_in_force_in_it(events):
+    decided = [event for event in events if isinstance(event, Decided) and event.question.purpose == "steer"]
+    for before, after in zip(decided, generations(events)[1:], strict=True):
+        np.testing.assert_array_equal(before.bounds, after.bounds)
+
+
 def test_the_choice_always_lies_within(events):
     for event in events:
         if isinstance(event, Decided) and event.question.purpose == "steer":
