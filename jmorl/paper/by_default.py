@@ -26,7 +26,9 @@ class StudyRuns:
     records: Sequence[RunRecord] = field(default_factory=list)
 
     def of(self, plan: Plan, item: Item, goal: str) -> dict[int, RunRecord]:
-        """Return the runs there are by default for a user or target, by seed."""
+        """Return the runs there are by default for a user or target, by seed; of a quick plan there are none."""
+        if plan.quick or not self.records:
+            return {}
         found = {}
         for seed in plan.seeds_of(item):
             given = {"env": item.env, "user": plan.goals(item, "raw")[goal], "seed": seed, "steps": plan.steps(item)}
