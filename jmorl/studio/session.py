@@ -23,6 +23,7 @@ from jmorl.report.timeline import Timeline
 from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
+from jmorl.storage.policy_file import load_policy
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
@@ -148,10 +149,19 @@ class Session:
         self.dialogue = None
 
     def policy_file(self, run: str, policy: int) -> Path | None:
-        """Return the file of an archived policy of a run in the history; None if there is none."""
+        """Return the file of an archived policy of a run in the history, the result's with its confirmed score.
+
+        None if there is none.
+        """
         member = next((each for each in self.history() if each.run == run), None)
-        path = Layout(member.path).policy(policy) if member else None
-        return path if path and path.is_file() else None
+        if member is None:
+            return None
+        layout = Layout(member.path)
+        ended = layout.result.exists() and layout.chosen.exists()
+        if ended and load_policy(layout.chosen).header["id"] == policy:
+            return layout.chosen
+        path = layout.policy(policy)
+        return path if path.is_file() else None
 
     def leave(self) -> None:
         """Leave the run after the generation that is going on, at once if it waits for an answer; it can be resumed."""

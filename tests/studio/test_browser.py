@@ -38,7 +38,7 @@ def decisions(path):
 
 def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path):
     path = tmp_path / "first"
-    with Served("--out", path, "--steps", 624_000, "--population.iterations", 4) as studio:
+    with Served("--out", path, "--steps", 624_000, "--population.iterations", 4, "--ask", "always") as studio:
         tab = Tab(browser, studio.address)
         tab.page.get_by_text("Warm-up: training 6 new agents").wait_for()
         tab.screenshot("1-warm-up")
