@@ -55,8 +55,8 @@ def run(
     earlier run ended with, the run goes on from there; on the same machine it finds the same as the earlier one did.
     An `environment` that is not the config's is refused with NotAsDeclared.
     The `history` of its decisions is what a stand-in needs to know then (`ask` and `question` in the config); with
-    `ask_now` it leaves the next question to the decision maker. The
-    tasks of a generation are selected within `selecting()`, where nothing is lost if it is broken off.
+    `ask_now` it leaves the next question to the decision maker. The tasks of a generation are selected within
+    `selecting()`, where nothing is lost if it is broken off.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
     MethodError for tasks that cannot be trained; the events before it stand.

@@ -1,6 +1,7 @@
 """Confirmed scores: from fresh starts, of the finalists, before the last question, and in everything a run leaves."""
 
 import json
+import shutil
 
 import jax
 import numpy as np
@@ -16,7 +17,7 @@ from jmorl.loop import run
 from jmorl.report.progress import watcher
 from jmorl.report.tables import run_tables
 from jmorl.storage.policy_file import load_policy
-from jmorl.storage.stored_run import read_run
+from jmorl.storage.stored_run import StoredRunError, read_run
 from tests.resuming import train
 
 EPISODES = 8
@@ -131,3 +132,13 @@ def test_people_are_told(folder, events, config, capsys):
 
     watcher("lines", config, envs.make(config.env).objectives, PlainConsole()).show(events[-1])
     assert "on 8 fresh episodes, 99 % sure; " in capsys.readouterr().out
+
+
+def test_a_result_that_lost_part_of_its_confirmed_score_is_named(folder, tmp_path):
+    path = tmp_path / "damaged"
+    shutil.copytree(folder, path)
+    result = json.loads((path / "result.json").read_text())
+    del result["chosen"][next(name for name in result["chosen"] if name.startswith("error_"))]
+    (path / "result.json").write_text(json.dumps(result))
+    with pytest.raises(StoredRunError, match="result.json cannot be read: it has no 'error_"):
+        read_run(path)

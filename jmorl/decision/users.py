@@ -141,8 +141,7 @@ def _options(written: str) -> dict[str, str]:
             raise ValueError(f"a user has no option {key!r}; known: {', '.join(OPTIONS.values())}{near}")
         else:
             listed[name].append(word)
-    options = {name: ",".join(words) for name, words in listed.items()}
-    return options
+    return {name: ",".join(words) for name, words in listed.items()}
 
 
 def _shape(options: Mapping[str, str], count: int) -> Callable[[list[float]], Utility]:

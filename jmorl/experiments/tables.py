@@ -4,8 +4,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from jmorl.display.text import plural
 from jmorl.experiments.diagnostics import mechanism
-from jmorl.experiments.statistics import Difference, Interval
+from jmorl.experiments.statistics import FEWEST, Difference, Interval
 from jmorl.experiments.targets import TargetRow, compared
 
 
@@ -28,6 +29,13 @@ def million(steps: float) -> str:
 def between(found: Interval | Difference) -> str:
     """Write a mean of steps and its interval, in millions."""
     return f"{found.mean / 1e6:.2f} [{found.low / 1e6:.2f}, {found.high / 1e6:.2f}]"
+
+
+def gain(found: Difference) -> str:
+    """Write a mean gain, with its interval where there are seeds enough for one."""
+    if found.count < FEWEST:
+        return f"{found.mean:+.3g} (of {plural(found.count, 'seed')})"
+    return f"{found.mean:+.3g} [{found.low:+.3g}, {found.high:+.3g}], {found.certainty}"
 
 
 def number(value: float, form: str, otherwise: str = "") -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from jmorl.config import resolve
 from jmorl.experiments.record import RunRecord, read_record
-from jmorl.experiments.tables import between, share, table
+from jmorl.experiments.tables import between, gain, share, table
 from jmorl.experiments.targets import TargetRow, compared, target_row
 from jmorl.paper.plan import Item, Plan
 from jmorl.paper.results import Curves, advantage, curves_of
@@ -87,7 +87,7 @@ def curves_section(ours: Sequence[Curves], others: Sequence[Curves]) -> list[str
         mine = [row.user, f"{row.last.mean():.4g}", asked]
         for other in (each for each in others if each.user == row.user):
             found = advantage(row, other)
-            gain = f"{found.mean:+.3g} [{found.low:+.3g}, {found.high:+.3g}], {found.certainty}" if found else ""
-            lines.append([*mine, other.method, f"{other.last.mean():.4g}", gain])
+            gained = gain(found) if found else ""
+            lines.append([*mine, other.method, f"{other.last.mean():.4g}", gained])
             mine = ["", "", ""]
     return [INTRODUCTION, table(head, lines)] if lines else []

@@ -102,6 +102,8 @@ def read_run(path: Path | str) -> StoredRun:
     decisions = tuple(record for record in decisions if record.generation <= generations)
     run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result)
     _check_together(run)
+    with _reading(layout.result):
+        _ = run.chosen  # its confirmed score can be read
     return run
 
 

@@ -10,7 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from jmorl.report.timeline import Timeline
 from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
-from jmorl.storage.policy_file import load_policy
+from jmorl.storage.policy_file import PolicyFileError, load_policy
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
@@ -157,9 +157,10 @@ class Session:
         if member is None:
             return None
         layout = Layout(member.path)
-        ended = layout.result.exists() and layout.chosen.exists()
-        if ended and load_policy(layout.chosen).header["id"] == policy:
-            return layout.chosen
+        if layout.result.exists():
+            with suppress(PolicyFileError):
+                if load_policy(layout.chosen).header["id"] == policy:
+                    return layout.chosen
         path = layout.policy(policy)
         return path if path.is_file() else None
 

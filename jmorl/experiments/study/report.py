@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jmorl.display.text import plural
 from jmorl.experiments import tables
-from jmorl.experiments.statistics import FEWEST, Difference, Times
+from jmorl.experiments.statistics import Times
 from jmorl.experiments.study.figures import draw
 from jmorl.experiments.study.plan import Study, StudyPart
 from jmorl.experiments.study.results import (
@@ -21,7 +20,7 @@ from jmorl.experiments.study.results import (
     target_rows,
     user_rows,
 )
-from jmorl.experiments.tables import million, number, share, table
+from jmorl.experiments.tables import gain, million, number, share, table
 from jmorl.storage.files import write_text
 
 
@@ -64,7 +63,7 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
             "of the best: mean, a run that never has one counting as the budget, and how many have one."
         )
         yield _user_table(users)
-        yield "Utility gained against the other methods, as paired differences (clear: the interval excludes 0):"
+        yield "Utility gained against the other methods, as paired differences (clearly: the interval excludes 0):"
         yield _gains(users, study.contenders_of(part))
     if targets:
         yield tables.steps_used(targets)
@@ -106,16 +105,9 @@ def _gains(rows: Sequence[UserRow], methods: Sequence[str]) -> str:
         cells = [user]
         for other in methods[1:]:
             found = gained(of_user[first], of_user[other]) if {first, other} <= of_user.keys() else None
-            cells.append(_gain(found) if found else "")
+            cells.append(gain(found) if found else "")
         lines.append(cells)
     return table(["user", *(f"{first} against {other}" for other in methods[1:])], lines)
-
-
-def _gain(found: Difference) -> str:
-    """Write a gain, with an interval where there are runs enough for one."""
-    if found.count < FEWEST:
-        return f"{found.mean:+.3g} (of {plural(found.count, 'seed')})"
-    return f"{found.mean:+.3g} [{found.low:+.3g}, {found.high:+.3g}]{', clear' if found.clear else ''}"
 
 
 def _calibrations(study: Study, part: StudyPart, records: Records) -> str:
