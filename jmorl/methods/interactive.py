@@ -13,6 +13,8 @@ from jmorl.search.bounds import members_within, widened_bounds, within
 from jmorl.search.metrics import Utility
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Policy, values_of
+from jmorl.search.scaling import range_scale
+from jmorl.search.scouts import Scouts, supporting_weights
 from jmorl.state import RunState
 
 PATIENCE = 2  # generations with one choice, after which the search has stagnated
@@ -32,28 +34,35 @@ class Interactive(PGMORL):
         return Question("steer", generation, objectives, members, search.bounds, previous, limits=search.limits)
 
     def tasks(self, run: RunState) -> Tasks:
-        """Return tasks within the bounds; while the same policy stays preferred, some of them anywhere."""
-        stays = run.search.generations_with_choice >= PATIENCE
-        outside = round(self.problem.search.outside_share * self.problem.agents) if stays else 0
-        if not outside:
+        """Return tasks within the bounds; while the same policy stays preferred, some of them train scouts."""
+        scouts = self._scouts(run.search)
+        if not scouts or run.choice is None:
             return super().tasks(run)
         generator = np.random.default_rng([self.problem.seed, run.generation])
-        unbounded = replace(
-            run, choice=None, search=replace(run.search, bounds=np.full_like(run.search.bounds, -np.inf))
+        scale = range_scale(run.archive.values)
+        towards = supporting_weights(
+            scale.apply(run.choice.values), scale.apply(run.archive.values), self.candidate_weights()
         )
-        parts = [self.selected(unbounded, super().candidates(run), outside, generator)]
-        if outside < self.problem.agents:
-            parts.insert(0, self.selected(run, self.candidates(run), self.problem.agents - outside, generator))
+        count = len(scouts)
+        parts = [self.promised(run, scouts, self.prediction(run, scouts), [*range(count)], [towards] * count)]
+        if count < self.problem.agents:
+            parts.insert(0, self.selected(run, self.candidates(run), self.problem.agents - count, generator))
         return Tasks(
             [parent for part in parts for parent in part.parents],
             np.concatenate([part.weights for part in parts]),
             np.concatenate([part.predicted for part in parts]),
-            max(part.candidates for part in parts),
+            parts[0].candidates,
             *(
                 _joined([getattr(part, name) for part in parts], axis)
                 for name, axis in (("interval", 1), ("spread", 0))
             ),
         )
+
+    def _scouts(self, search: PGMORLState) -> tuple[Policy, ...]:
+        """Return the scouts that the next generation trains. Once underway they go on, also if the choice moves."""
+        if not search.scouts.underway and search.generations_with_choice < PATIENCE:
+            return ()
+        return search.scouts.trained_now(round(self.problem.search.scout_share * self.problem.agents))
 
     def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> PGMORLState:
         """Return the state with the bounds that follow from the choice."""
@@ -83,6 +92,10 @@ class Interactive(PGMORL):
         Where no question follows, bounds that give way do so anew: the offspring may lie within them.
         """
         state = super().taken_in(run, offspring, tasks)
+        if tasks is None:
+            state = replace(state, scouts=Scouts(tuple(offspring)))
+        elif scouts := self._scouts(run.search):
+            state = replace(state, scouts=state.scouts.after(offspring[-len(scouts) :]))
         state = replace(state, silent_generations=max(state.silent_generations - 1, 0))
         if run.choice is None:
             return state

@@ -16,6 +16,7 @@ from jmorl.search.metrics import Utility, prediction_metrics, utility_metrics
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.prediction import Prediction, Records, predict
 from jmorl.search.scaling import REFERENCE_MARGIN, Scale, range_scale, search_scale
+from jmorl.search.scouts import Scouts
 from jmorl.search.selection import select_tasks
 from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
@@ -35,6 +36,7 @@ class PGMORLState:
     widenings: int = 0  # of the bounds
     generations_with_choice: int = 0  # trained since another policy was chosen
     limits: tuple[float, ...] | None = None  # [M] that the decision maker has set, -inf where none; None: never any
+    scouts: Scouts = Scouts()
 
 
 class PGMORL(Method[PGMORLState]):
@@ -74,7 +76,18 @@ class PGMORL(Method[PGMORLState]):
             search.sparsity_weight,
             generator,
         )
-        candidates, weights = [task.candidate for task in tasks], [task.weight for task in tasks]
+        pairs = [task.candidate for task in tasks], [task.weight for task in tasks]
+        return self.promised(run, continued, prediction, *pairs)
+
+    def promised(
+        self,
+        run: RunState,
+        continued: Sequence[Policy],
+        prediction: Prediction,
+        candidates: Sequence[int],
+        weights: Sequence[int],
+    ) -> Tasks:
+        """Return the tasks of these pairs of continued policies and weights, with what is expected of them."""
         expected, spread = prediction.expected[candidates, weights], prediction.spread[candidates]
         known = len(run.search.records.parents) > 0
         ends = run.search.records.interval_ends()
@@ -136,12 +149,15 @@ class PGMORL(Method[PGMORLState]):
     def pack(self, state: PGMORLState) -> PackedSearch:
         """Return the state as a checkpoint keeps it. Records are left out before there are any."""
         records = {f"records_{name}": array for name, array in vars(state.records).items() if len(array)}
+        groups = {name: getattr(state.scouts, name) for name in ("starts", "underway")}
         document = {
             "buffer": [policy.id for policy in state.buffer.members],
             **{name: getattr(state, name) for name in COUNTERS},
             "limits": state.limits and [limit if np.isfinite(limit) else None for limit in state.limits],
+            "scouts": vars(state.scouts) | {name: [each.id for each in group] for name, group in groups.items()},
         }
-        return PackedSearch(document, {"bounds": state.bounds, **records}, state.buffer.members)
+        policies = dict.fromkeys((*state.buffer.members, *groups["starts"], *groups["underway"]))
+        return PackedSearch(document, {"bounds": state.bounds, **records}, tuple(policies))
 
     def unpack(
         self, document: Mapping[str, Any], arrays: Mapping[str, np.ndarray], policies: Mapping[int, Policy]
@@ -153,13 +169,15 @@ class PGMORL(Method[PGMORLState]):
             nothing = np.full_like(arrays[names[0]], np.nan)
             records = Records(*(arrays.get(each, nothing) for each in names))
         state = self._state(tuple(policies[each] for each in document["buffer"]), records)
-        # Runs of earlier versions have fewer counters; their bounds never gave way, and nobody could set limits.
-        limits = document.get("limits")
+        # Runs of earlier versions have fewer counters: their bounds never gave way, nobody could set limits or scout.
+        limits, scouts = document.get("limits"), document.get("scouts", vars(Scouts()))
+        groups = {name: tuple(policies[each] for each in scouts[name]) for name in ("starts", "underway")}
         return replace(
             state,
             bounds=arrays["bounds"],
             **{name: document.get(name, 0) for name in COUNTERS},
             limits=limits and tuple(-np.inf if limit is None else float(limit) for limit in limits),
+            scouts=Scouts(**{**scouts, **groups}),
         )
 
     def _state(self, members: tuple[Policy, ...], records: Records) -> PGMORLState:

@@ -23,9 +23,9 @@ class SearchConfig(Section):
         3,
         description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
     )
-    outside_share: Annotated[float, Field(ge=0, le=1)] = Field(
+    scout_share: Annotated[float, Field(ge=0, le=1)] = Field(
         0.17,
-        description="interactive: share of the tasks outside the bounds while the choice stays; 0: none (the paper)",
+        description="interactive: share of the tasks that train scouts while the choice stays; 0: none (the paper)",
     )
     gain_within: Literal["bounds", "front"] = Field(
         "bounds", description="interactive: measure gains inside the bounds, or over the whole front (the paper)"

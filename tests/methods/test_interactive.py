@@ -12,9 +12,10 @@ from jmorl.decision.protocol import Answer
 from jmorl.loop import make_method
 from jmorl.search.bounds import within
 from jmorl.search.policy import values_of
+from jmorl.search.scouts import ENDURANCE, Scouts
 from tests.resuming import Counting, go_on, outcome, train
 
-WIDE = {"delta": 1e-3, "least_within": 3, "least_slack": 0.01, "outside_share": 0.5}
+WIDE = {"delta": 1e-3, "least_within": 3, "least_slack": 0.01, "scout_share": 0.5}
 
 
 @pytest.fixture(scope="module")
@@ -66,20 +67,48 @@ def test_the_choice_always_lies_within(events):
             assert within(event.chosen.values[None], event.bounds).all()
 
 
-def test_while_the_choice_stays_some_tasks_lie_anywhere(config, events):
+def test_while_the_choice_stays_some_tasks_train_scouts_towards_it(config, events):
     """Two of four, from the third generation with the same choice on."""
     method: Any = make_method(config, envs.make(config.env))
     state = replace(generations(events)[-1].state, generation=9)
-    stayed = replace(state, search=replace(state.search, generations_with_choice=2))
-    moved = replace(state, search=replace(state.search, generations_with_choice=1))
-    unbounded = replace(stayed, choice=None, search=replace(stayed.search, bounds=np.full(3, -np.inf)))
-    anywhere = method.selected(unbounded, list(state.search.buffer.members), 2, np.random.default_rng([config.seed, 9]))
+    policies = state.archive.members
+    idle = Scouts(starts=(policies[0], policies[-1], policies[1]), sent=2)
+    stayed = replace(state, search=replace(state.search, generations_with_choice=2, scouts=idle))
+    moved = replace(state, search=replace(state.search, generations_with_choice=1, scouts=idle))
     tasks, bounded = method.tasks(stayed), method.tasks(moved)
     assert len(tasks.parents) == len(bounded.parents) == 4
-    np.testing.assert_array_equal(tasks.weights[2:], anywhere.weights)
-    assert [parent.id for parent in tasks.parents[2:]] == [parent.id for parent in anywhere.parents]
-    inside = {policy.id for policy in method.candidates(moved)}
-    assert {parent.id for parent in bounded.parents} <= inside
+    assert tasks.parents[2:] == [policies[1], policies[0]]
+    inside = method.candidates(moved)
+    assert all(parent in inside for parent in (*tasks.parents[:2], *bounded.parents))
+    # Their weights are those for which the choice loses least, in values scaled by range.
+    span = np.ptp(state.archive.values, axis=0)
+    lost = [
+        ((state.archive.values - state.choice.values) / np.where(span > 0, span, 1) @ weights).max()
+        for weights in method.candidate_weights()
+    ]
+    for weights in tasks.weights[2:]:
+        np.testing.assert_array_equal(weights, method.candidate_weights()[np.argmin(lost)])
+    expected = method.prediction(stayed, tasks.parents[2:]).expected[:, np.argmin(lost)]
+    np.testing.assert_array_equal(tasks.predicted[2:], expected)
+
+
+def test_scouts_go_on_for_their_generations_also_if_the_choice_moves(config, events):
+    """Their children become the scouts of the next generation."""
+    method: Any = make_method(config, envs.make(config.env))
+    state = replace(generations(events)[-1].state, generation=9)
+    policies = state.archive.members
+    underway = Scouts(starts=policies[:2], underway=policies[2:4], generations=ENDURANCE - 2, sent=5)
+    search = replace(state.search, generations_with_choice=0, scouts=underway)
+    for underway_after in (policies[-2:], ()):
+        run = replace(state, search=search)
+        tasks = method.tasks(run)
+        assert tuple(tasks.parents[2:]) == search.scouts.underway
+        search = method.taken_in(run, [*policies[:2], *policies[-2:]], tasks)
+        assert search.scouts.underway == underway_after
+    search = replace(search, generations_with_choice=0)
+    assert search.scouts == Scouts(policies[:2], sent=5)
+    inside = method.candidates(replace(state, search=search))
+    assert all(parent in inside for parent in method.tasks(replace(state, search=search)).parents)
 
 
 def test_such_a_run_resumes_to_the_same_result(config, tmp_path):
@@ -218,3 +247,38 @@ def test_a_slip_that_is_taken_back_at_once_leaves_the_run_as_it_was(config):
         assert other.state.choice is None or other.state.choice.id == event.state.choice.id
         assert other.state.search.generations_with_choice == event.state.search.generations_with_choice
         np.testing.assert_array_equal(other.state.search.bounds, event.state.search.bounds)
+
+
+# --- scouts -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def stagnating(config):
+    return list(run(config, Slips(config, None)))
+
+
+def test_scouts_start_from_the_warm_up_and_go_on_from_their_children(stagnating):
+    warm_up, *later = generations(stagnating)
+    starts = warm_up.state.search.scouts.starts
+    assert starts == tuple(warm_up.offspring)
+    before, first = warm_up, True
+    for event in later:
+        scouts = event.state.search.scouts
+        assert scouts.starts == starts
+        if scouts.underway:
+            assert scouts.underway == tuple(event.offspring[2:])
+            parents = [policy.parent for policy in scouts.underway]
+            came_from = starts[:2] if first else before.state.search.scouts.underway
+            assert parents == [policy.id for policy in came_from]
+            first = False
+        before = event
+    assert not first
+
+
+def test_a_run_with_scouts_underway_resumes_to_the_same_result(config, stagnating, tmp_path):
+    whole = train(tmp_path / "whole", config, user=Slips(config, None))
+    underway = [event for event in stagnating if isinstance(event, GenerationFinished)][-2]
+    assert underway.state.search.scouts.underway
+    path = train(tmp_path / "broken", config, user=Slips(config, None), events=stagnating.index(underway) + 1)
+    go_on(path, user=Slips(config, None))
+    assert outcome(path) == outcome(whole)

@@ -12,6 +12,7 @@ from jmorl.search.archive import Archive
 from jmorl.search.buffer import PerformanceBuffer
 from jmorl.search.policy import Policy
 from jmorl.search.prediction import Records
+from jmorl.search.scouts import Scouts
 from jmorl.state import RunState
 from jmorl.units import RunningUnits
 
@@ -70,6 +71,7 @@ def make_state(make_policy, small_config):
                 widenings=generation + 1,
                 generations_with_choice=generation + 2,
                 limits=(-np.inf, 1.0, 2.0 + generation),
+                scouts=Scouts(tuple(policies[:2]), (policies[-1],), generation, 3 * generation),
             ),
             archive=Archive((policies[3], policies[0], policies[-1])),
             units=RunningUnits(*generator.normal(size=(4, 3))),

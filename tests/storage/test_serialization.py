@@ -52,10 +52,13 @@ def test_a_state_in_raw_units_comes_back_too(make_state, small_config, environme
 
     buffer = state.search.buffer
     in_raw_units = dataclasses.replace(buffer, members=raw(buffer.members))
+    scouts = dataclasses.replace(
+        state.search.scouts, starts=raw(state.search.scouts.starts), underway=raw(state.search.scouts.underway)
+    )
     state = dataclasses.replace(
         state,
         units=None,
-        search=dataclasses.replace(state.search, buffer=in_raw_units),
+        search=dataclasses.replace(state.search, buffer=in_raw_units, scouts=scouts),
         archive=Archive(raw(state.archive.members)),
         choice=raw([state.choice])[0],
     )
