@@ -1,6 +1,7 @@
 """The front of two objectives: how it grew, what was chosen, and what came of it."""
 
 from collections.abc import Container, Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from jmorl.display.text import plural
 from jmorl.report.labels import place_labels
 from jmorl.report.style import (
     BLUE,
+    GREY,
     INK,
     PALE,
     RED,
@@ -33,8 +35,19 @@ from jmorl.storage.stored_run import StoredRun
 BOUNDS_LINE: dict[str, Any] = {"color": BLUE, "alpha": 0.4, "linewidth": 0.9, "linestyle": (0, (4, 3))}
 BOUNDS_AREA: dict[str, Any] = {"facecolor": BLUE, "alpha": 0.07, "edgecolor": "none"}
 RING: dict[str, Any] = {"marker": "o", "color": INK, "markerfacecolor": "none", "linestyle": "", "markersize": 7}
+RING_OF_STAND_IN: dict[str, Any] = {**RING, "color": GREY, "markersize": 5}
+CONFIRMED_LINE: dict[str, Any] = {"color": RED, "linewidth": 1.0}
 STAR: dict[str, Any] = {"marker": "*", "color": RED, "markeredgecolor": "white", "linestyle": "", "markersize": 16}
 ZOOM = 0.4  # a front that fills less of the whole picture gets one of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A policy that steered the search."""
+
+    generations: str  # that it was chosen for
+    values: np.ndarray  # [M]
+    asked: bool  # the decision maker was, at least once; otherwise a stand-in chose it
 
 
 def front_figure(run: StoredRun, title: str) -> Figure:
@@ -66,9 +79,12 @@ def draw_policies(axes: Axes, run: StoredRun, pair: list[int], limits: np.ndarra
     x, y = values_of(run.front)[:, pair].T
     colours = [generation_colour(policy.generation, last) for policy in run.front]
     axes.scatter(x, y, s=30, c=colours, edgecolors="white", linewidths=0.7, zorder=4)
-    for _, values in choices_of(run):
-        axes.plot(*values[pair], zorder=5, **RING)
+    for choice in choices_of(run):
+        axes.plot(*choice.values[pair], zorder=5, **(RING if choice.asked else RING_OF_STAND_IN))
     if run.chosen:
+        if run.chosen.confirmation:
+            claimed = run.chosen.confirmation.claimed[pair]
+            axes.plot(*np.stack([claimed, run.chosen.values[pair]], axis=1), zorder=6, **CONFIRMED_LINE)
         axes.plot(*run.chosen.values[pair], zorder=7, **STAR)
     x, y = run.bounds[-1, pair]
     if np.isfinite([x, y]).all():
@@ -81,14 +97,20 @@ def draw_policies(axes: Axes, run: StoredRun, pair: list[int], limits: np.ndarra
     note_outside(axes, values_of(run.policies)[:, pair], limits)
 
 
-def choices_of(run: StoredRun) -> list[tuple[str, np.ndarray]]:
-    """Return the policies that steered the search, each once: the generations it was chosen for, and its values [M]."""
-    asked: dict[int, tuple[list[int], np.ndarray]] = {}
+def choices_of(run: StoredRun) -> list[Choice]:
+    """Return the policies that steered the search, each once."""
+    decisions: dict[int, list[DecisionRecord]] = {}
     for record in run.decisions:
         if isinstance(record, DecisionRecord) and record.purpose == "steer":
-            generations, _ = asked.setdefault(record.policy, ([], np.array(record.values)))
-            generations.append(record.generation)
-    return [(_ranges(generations), values) for generations, values in asked.values()]
+            decisions.setdefault(record.policy, []).append(record)
+    return [
+        Choice(
+            _ranges(record.generation for record in records),
+            np.array(records[0].values),
+            not all(record.stand_in for record in records),
+        )
+        for records in decisions.values()
+    ]
 
 
 def whole_view(run: StoredRun) -> np.ndarray:
@@ -122,14 +144,18 @@ def legend_of(run: StoredRun, choice: str, without: Container[str] = ()) -> list
     if last:
         entries["earlier"] = Line2D([], [], color=early, linewidth=0.9, label="earlier front")
     entries["front"] = Line2D([], [], color=late, marker="o", markeredgecolor="white", label=front_name(run))
-    if choices_of(run):
+    choices = choices_of(run)
+    if any(each.asked for each in choices):
         entries["choice"] = Line2D([], [], label=choice, **RING)
+    if not all(each.asked for each in choices):
+        entries["stand-in"] = Line2D([], [], label=f"{choice}, by the stand-in", **RING_OF_STAND_IN)
     if np.isfinite(run.bounds).all(axis=1).any():
         entries["bounds"] = Line2D([], [], label="bounds of a choice", **BOUNDS_LINE)
     if np.isfinite(run.bounds[-1]).all():
         entries["bounds area"] = Patch(label="within the last bounds", **BOUNDS_AREA)
     if run.chosen:
-        entries["chosen"] = Line2D([], [], label=f"chosen: policy {run.chosen.id}", **STAR)
+        confirmed = ", confirmed score" if run.chosen.confirmation else ""
+        entries["chosen"] = Line2D([], [], label=f"chosen: policy {run.chosen.id}{confirmed}", **STAR)
     return [entry for kind, entry in entries.items() if kind not in without]
 
 
@@ -180,13 +206,15 @@ def _label_choices(axes: Axes, run: StoredRun, limits: np.ndarray, hidden: np.nd
     """Return the generation at each choice within the limits [2, 2], but none within those that another view shows."""
     choices = choices_of(run)
     shown = [
-        (text, values)
-        for text, values in choices
-        if inside(values, limits) and (hidden is None or not inside(values, hidden))
+        choice
+        for choice in choices
+        if inside(choice.values, limits) and (hidden is None or not inside(choice.values, hidden))
     ]
     if shown:
-        avoid = np.stack([*values_of(run.front), *(values for _, values in choices)])
-        place_labels(axes, np.stack([values for _, values in shown]), [text for text, _ in shown], avoid)
+        avoid = np.stack([*values_of(run.front), *(choice.values for choice in choices)])
+        place_labels(
+            axes, np.stack([choice.values for choice in shown]), [choice.generations for choice in shown], avoid
+        )
 
 
 def _ranges(numbers: Iterable[int]) -> str:

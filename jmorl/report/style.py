@@ -1,5 +1,6 @@
 """How every plot looks: fonts, colours, sizes, and the way to a file. No global state, and no window."""
 
+import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from jmorl.display.text import objective_label
 from jmorl.storage.files import written_whole
 
 DOTS_PER_INCH = 150
+TITLE_CHARACTERS = 10.5  # of a title in an inch
 # Okabe and Ito's colours, which colour-blind people can tell apart.
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 INK, GREY, PALE = "#222222", "#767676", "#b8b8b8"
@@ -69,7 +71,8 @@ def new_figure(width: float, height: float, title: str) -> Figure:
     """Return an empty figure, in inches, whose layout keeps everything apart."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    lines = textwrap.wrap(title, int(TITLE_CHARACTERS * width))
+    figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
     return figure
 
 
@@ -96,8 +99,12 @@ def generation_bar(figure: Figure, axes: Sequence[Axes], last: int) -> None:
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist], columns: int) -> None:
-    """Draw the legend of all axes, below them."""
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+    """Draw the legend of all axes, below them; in so many columns, or as many as there is room for."""
+    for count in range(columns, 0, -1):
+        legend = figure.legend(handles=handles, loc="outside lower center", ncols=count)
+        if legend.get_window_extent().width <= figure.bbox.width or count == 1:
+            return
+        legend.remove()
 
 
 def label_axes(axes: Axes, x: Objective, y: Objective) -> None:

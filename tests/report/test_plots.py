@@ -126,10 +126,39 @@ def test_dollar_signs_are_no_formulae(make_run):
 
 def test_choices_are_numbered_by_generation_and_drawn_together(make_run):
     run = make_run()
-    numbered = {text for text, _ in choices_of(run)}
+    numbered = {choice.generations for choice in choices_of(run)}
     assert "7–8" in numbered and "9" in numbered
     with style():
         assert numbered <= set(texts(front_figure(run, "title")))
+
+
+def test_choices_of_a_stand_in_are_told_from_a_persons(make_run):
+    """A choice that somebody made at least once is theirs."""
+    run = make_run()
+    answered = tuple(replace(each, stand_in=each.generation not in (1, 8)) for each in run.decisions)
+    choices = {choice.generations: choice.asked for choice in choices_of(replace(run, decisions=answered))}
+    assert choices["7–8"] and choices["1"] and not choices["9"]
+    with style():
+        told = texts(front_figure(replace(run, decisions=answered), "title"))
+        before = texts(front_figure(run, "title"))
+    assert {"choice, with its generation", "choice, with its generation, by the stand-in"} <= set(told)
+    assert not any("stand-in" in text for text in before)
+
+
+def test_a_confirmed_score_is_tied_to_the_score_that_the_search_went_by(make_run):
+    run = make_run()
+    claimed = run.chosen
+    numbers = {"value": claimed.values - 1, "std": claimed.std, "error": np.ones(2)}
+    numbers |= {"claimed": claimed.values, "claimed_std": claimed.std}
+    row = {
+        f"{name}_{each.name}": values[i] for name, values in numbers.items() for i, each in enumerate(run.objectives)
+    }
+    run = replace(run, result={"reason": "budget", "chosen": row | {"policy": claimed.id, "confirmation_episodes": 9}})
+    with style():
+        figure = front_figure(run, "title")
+    ends = np.stack([claimed.values, claimed.values - 1])
+    assert any(np.array_equal(line.get_xydata(), ends) for line in figure.axes[0].get_lines())
+    assert f"chosen: policy {claimed.id}, confirmed score" in texts(figure)
 
 
 def test_labels_of_choices_cover_neither_each_other_nor_policies(make_run):
@@ -141,11 +170,22 @@ def test_labels_of_choices_cover_neither_each_other_nor_policies(make_run):
             labels = [text for text in axes.texts if text.get_bbox_patch() is not None]
             boxes = [label.get_bbox_patch().get_window_extent() for label in labels]
             assert labels
-            shown = axes.transData.transform([values for _, values in choices_of(run)])
+            shown = axes.transData.transform([choice.values for choice in choices_of(run)])
             front = axes.transData.transform(values_of(run.front))
             for index, box in enumerate(boxes):
                 assert not any(box.overlaps(other) for other in boxes[:index])
                 assert not box.count_contains(shown) and not box.count_contains(front)
+
+
+def test_long_titles_and_legends_stay_within_the_picture(make_run):
+    run = make_run()
+    answered = tuple(replace(each, stand_in=each.generation > 2) for each in run.decisions)
+    with style():
+        figure = front_figure(replace(run, decisions=answered), "environment, method, user " + "1.2345," * 30)
+        figure.savefig(io.BytesIO(), format="png")
+        for artist in (figure.legends[0], figure._suptitle):
+            box = artist.get_window_extent()
+            assert box.x0 >= 0 and box.x1 <= figure.bbox.width
 
 
 @pytest.mark.parametrize(("has_utility", "panels"), [(True, 3), (False, 2)])
