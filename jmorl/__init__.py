@@ -13,17 +13,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from envs import Objective
     from jmorl.config import Config, ConfigError, resolve
+    from jmorl.decision.answers import Adjust, Answer, AnswerError, Back, Choose, PointAnswer
     from jmorl.decision.navigation import NavigationFinished, PointDecided, navigate
     from jmorl.decision.protocol import (
-        Adjust,
-        Answer,
-        AnswerError,
         AnyQuestion,
-        Back,
-        Choose,
         DecisionMaker,
         PairQuestion,
-        PointAnswer,
         PointQuestion,
         Question,
         WeightQuestion,
@@ -98,9 +93,9 @@ __all__ = [
 # read, and the command line is to say so.
 _HOMES = {
     "jmorl.config": "Config ConfigError resolve",
+    "jmorl.decision.answers": "Adjust Answer AnswerError Back Choose PointAnswer",
     "jmorl.decision.navigation": "NavigationFinished PointDecided navigate",
-    "jmorl.decision.protocol": "Adjust Answer AnswerError AnyQuestion Back Choose DecisionMaker PairQuestion "
-    "PointAnswer PointQuestion Question WeightQuestion",
+    "jmorl.decision.protocol": "AnyQuestion DecisionMaker PairQuestion PointQuestion Question WeightQuestion",
     "jmorl.events": "Compiled Decided Event GenerationFinished Resumed RunFinished Seconds",
     "jmorl.experiments.comparison": "Comparison Contender compare",
     "jmorl.learning.devices": "use_all_cpu_cores",

@@ -9,7 +9,8 @@ import pytest
 
 import envs
 from jmorl.confirmation import confirmed, finalists
-from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker
 from jmorl.events import Decided, GenerationFinished, RunFinished
 from jmorl.experiments.record import record_of
 from jmorl.learning.population import Population

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from jmorl.config import resolve
-from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.utility import UtilityUser
 from jmorl.events import Compiled, Decided, GenerationFinished, RunFinished
 from jmorl.learning.population import Population, TrainingFault

@@ -6,8 +6,9 @@ from itertools import count
 
 from envs.core import Objective
 from jmorl.decision import enautilus
+from jmorl.decision.answers import Adjust, Back, Choose, PointAnswer
 from jmorl.decision.enautilus import State
-from jmorl.decision.protocol import Adjust, Back, Choose, PointAnswer, PointQuestion
+from jmorl.decision.protocol import PointQuestion
 from jmorl.search.policy import Policy, values_of
 
 

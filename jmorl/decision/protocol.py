@@ -3,25 +3,20 @@
 The run imports this; users implement it; neither knows the other.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
-from operator import index
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from envs.core import Objective
+from jmorl.decision.answers import Answer, AnswerError, Choose, PointAnswer, shortly, whole_number
 from jmorl.decision.enautilus import IntermediatePoint, State
 from jmorl.search.policy import Policy, values_of
 
 Purpose = Literal["steer", "final", "enautilus", "pair"]
 Form = Literal["best", "pair", "rank"]
-
-
-class AnswerError(ValueError):
-    """An answer that its question does not allow. The message says what was wrong, and what it should be."""
 
 
 class AnyQuestion(ABC):
@@ -119,10 +114,10 @@ class Question(AnyQuestion):
         """Return `user.answer(self)`."""
         return user.answer(self)
 
-    def checked(self, answer: Any) -> "Answer":
+    def checked(self, answer: Any) -> Answer:
         """Return the answer if it is an `Answer` with a policy of the front. Raise AnswerError."""
         if not isinstance(answer, Answer):
-            raise AnswerError(f"answer must return a jmorl.Answer(policy id), not {_shortly(answer)}")
+            raise AnswerError(f"answer must return a jmorl.Answer(policy id), not {shortly(answer)}")
         try:
             self.policy(answer.policy)
             for each in answer.ranking:
@@ -134,7 +129,7 @@ class Question(AnyQuestion):
                 f"the ranking must begin with the preferred policy {answer.policy}: {list(answer.ranking)}"
             )
         if answer.limits is not None and len(answer.limits) != len(self.objectives):
-            raise AnswerError(f"limits must be {len(self.objectives)} numbers, not {_shortly(answer.limits)}")
+            raise AnswerError(f"limits must be {len(self.objectives)} numbers, not {shortly(answer.limits)}")
         return answer
 
     def to_json(self, answer: Any) -> dict[str, Any]:
@@ -156,41 +151,6 @@ class Question(AnyQuestion):
     def was_asked(self, answer: Any) -> bool:
         """Return whether a checked answer is the decision maker's own, and not a stand-in's."""
         return not answer.stand_in
-
-
-@dataclass(frozen=True)
-class Answer:
-    """The preferred policy, by id, and what the run shall do next.
-
-    Who likes none of those shown better than the policy chosen last answers with that one. Limits hold until others
-    are set. NumPy's and other whole numbers become Python's, and a `Policy` its id. Raises AnswerError for anything
-    else.
-    """
-
-    policy: int
-    stop: bool = False  # end the run here, with this policy
-    generations: int = 1  # how many generations to go on before the next question, at least 1
-    stand_in: bool = False  # a stand-in answered, and nobody was asked (`jmorl.decision.stand_in`)
-    reason: str = field(default="", compare=False)  # why a stand-in did
-    ranking: tuple[int, ...] = ()  # of those shown, from the best down; who is not in it is worse than who is
-    equal: bool = False  # no difference between those shown; `policy` is any of them, or the one chosen last
-    limits: tuple[float, ...] | None = None  # [M] what each objective must reach, -inf: anything; None: as before
-
-    def __post_init__(self) -> None:
-        ranking = tuple(_id("ranking", each) for each in _listed("ranking", self.ranking))
-        if len(set(ranking)) < len(ranking):
-            raise AnswerError(f"a policy is twice in the ranking {list(ranking)}")
-        if ranking and self.equal:
-            raise AnswerError("policies between which there is no difference cannot be ranked")
-        for name, value in (
-            ("policy", _id("policy", self.policy)),
-            ("generations", _whole("generations", self.generations, 1)),
-            ("stop", _truth("stop", self.stop)),
-            ("equal", _truth("equal", self.equal)),
-            ("ranking", ranking),
-            ("limits", None if self.limits is None else tuple(map(_limit, _listed("limits", self.limits)))),
-        ):
-            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)
@@ -216,7 +176,7 @@ class PairQuestion(AnyQuestion):
         if answer is None:
             return None
         ids = [policy.id for policy in self.pair]
-        preferred = answer.id if isinstance(answer, Policy) else _whole("the preferred policy", answer, 0)
+        preferred = answer.id if isinstance(answer, Policy) else whole_number("the preferred policy", answer, 0)
         if preferred not in ids:
             raise AnswerError(f"policy {preferred} is neither of the two shown: {ids}")
         return preferred
@@ -253,12 +213,11 @@ class WeightQuestion(AnyQuestion):
         try:
             weights = np.asarray(answer, float)
         except (TypeError, ValueError):
-            raise AnswerError(f"weights must be {len(self.objectives)} numbers, not {_shortly(answer)}") from None
+            raise AnswerError(f"weights must be {len(self.objectives)} numbers, not {shortly(answer)}") from None
         valid = weights.shape == (len(self.objectives),) and np.isfinite(weights).all() and (weights >= 0).all()
         if not valid or not weights.any():
             raise AnswerError(
-                f"weights must be {len(self.objectives)} numbers from zero upwards, not all zero, "
-                f"not {_shortly(answer)}"
+                f"weights must be {len(self.objectives)} numbers from zero upwards, not all zero, not {shortly(answer)}"
             )
         return tuple((weights / weights.sum()).tolist())
 
@@ -297,12 +256,12 @@ class PointQuestion(AnyQuestion):
         """Return `user.choose_point(self)`."""
         return user.choose_point(self)
 
-    def checked(self, answer: Any) -> "PointAnswer":
+    def checked(self, answer: Any) -> PointAnswer:
         """Return the answer if it is a point that is shown, or a way to go on. Raise AnswerError."""
         if not isinstance(answer, PointAnswer):
-            raise AnswerError(f"choose_point must return Choose, Back or Adjust, not {_shortly(answer)}")
+            raise AnswerError(f"choose_point must return Choose, Back or Adjust, not {shortly(answer)}")
         if isinstance(answer, Choose):
-            point = _whole("point", answer.point, 0)
+            point = whole_number("point", answer.point, 0)
             if point >= len(self.points):
                 raise AnswerError(f"there is no point {point} among the {len(self.points)} shown, from 0")
             return Choose(point)
@@ -311,31 +270,6 @@ class PointQuestion(AnyQuestion):
     def to_json(self, answer: Any) -> dict[str, Any]:
         """Return the fields of the answer."""
         return asdict(answer)
-
-
-@dataclass(frozen=True)
-class Choose:
-    """Move on to a point, by its index among those shown."""
-
-    point: int
-
-
-@dataclass(frozen=True)
-class Back:
-    """Undo the last choices."""
-
-    steps: int
-
-
-@dataclass(frozen=True)
-class Adjust:
-    """Go on in another number of iterations, or with more or fewer points in each."""
-
-    iterations_left: int  # 0: end here
-    points: int
-
-
-PointAnswer = Choose | Back | Adjust
 
 
 class DecisionMaker(ABC):
@@ -398,50 +332,3 @@ class DecisionMaker(ABC):
     def satisfied(self, values: np.ndarray) -> bool:
         """Return whether a run with the front `values` [N, M] may stop early."""
         return False
-
-
-def _id(name: str, value: Any) -> int:
-    """Return the id that a policy has, or that a value is. Raise AnswerError."""
-    return value.id if isinstance(value, Policy) else _whole(name, value, 0)
-
-
-def _listed(name: str, value: Any) -> Sequence[Any]:
-    """Return a sequence, which no text is. Raise AnswerError if it is none."""
-    if isinstance(value, (str, bytes)) or not hasattr(value, "__len__") or not hasattr(value, "__iter__"):
-        raise AnswerError(f"{name} must be a list, not {_shortly(value)}")
-    return list(value)
-
-
-def _truth(name: str, value: Any) -> bool:
-    """Return a truth value as Python's `bool`. Raise AnswerError if it is none."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise AnswerError(f"{name} must be True or False, not {_shortly(value)}")
-    return bool(value)
-
-
-def _limit(value: Any) -> float:
-    """Return a limit as Python's `float`; None is no limit. Raise AnswerError if it is no number."""
-    try:
-        number = -math.inf if value is None else float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if math.isnan(number) or number == math.inf:
-        raise AnswerError(f"a limit must be a number, or -inf for none, not {_shortly(value)}")
-    return number
-
-
-def _whole(name: str, value: Any, least: int) -> int:
-    """Return a whole number as Python's `int`. Raise AnswerError if it is none, or less than `least`."""
-    try:
-        number = int(value) if isinstance(value, (float, np.floating)) and float(value).is_integer() else index(value)
-    except TypeError:
-        raise AnswerError(f"{name} must be a whole number, not {_shortly(value)}") from None
-    if isinstance(value, (bool, np.bool_)) or number < least:
-        raise AnswerError(f"{name} must be a whole number, at least {least}, not {_shortly(value)}")
-    return number
-
-
-def _shortly(value: Any) -> str:
-    """Return how a value is written, cut where it is long."""
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -31,7 +31,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, Tag, TypeAdapter, ValidationError
 
-from jmorl.decision.protocol import Answer, AnyQuestion, Choose, PointAnswer, PointQuestion, Question
+from jmorl.decision.answers import Answer, Choose, PointAnswer
+from jmorl.decision.protocol import AnyQuestion, PointQuestion, Question
 from jmorl.search.policy import Policy
 
 FORMAT = 4  # the newest of any record

@@ -7,15 +7,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from jmorl.decision.protocol import (
-    Answer,
-    AnyQuestion,
-    Choose,
-    DecisionMaker,
-    PointAnswer,
-    PointQuestion,
-    Question,
-)
+from jmorl.decision.answers import Answer, Choose, PointAnswer
+from jmorl.decision.protocol import AnyQuestion, DecisionMaker, PointQuestion, Question
 from jmorl.decision.records import AnswerRecord, DecisionRecord, PointRecord, ScriptError, read_log
 from jmorl.decision.remembered import is_of
 from jmorl.search.policy import Policy

@@ -6,8 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from jmorl.decision.answers import Answer
 from jmorl.decision.preferences import Comparison, PreferenceModel, Verdict
-from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, Form, Question
+from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Form, Question
 from jmorl.decision.records import DecisionRecord, decision_record
 from jmorl.decision.remembered import RunRecord, by_stand_in
 from jmorl.decision.wrapper import Wrapper

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, DecisionMaker, Question
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker, Question
 from jmorl.search.bounds import within
 from jmorl.search.scaling import range_scale
 

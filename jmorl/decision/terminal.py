@@ -7,16 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from envs.core import Objective
-from jmorl.decision.protocol import (
-    Adjust,
-    Answer,
-    Back,
-    Choose,
-    DecisionMaker,
-    PointAnswer,
-    PointQuestion,
-    Question,
-)
+from jmorl.decision.answers import Adjust, Answer, Back, Choose, PointAnswer
+from jmorl.decision.protocol import DecisionMaker, PointQuestion, Question
 from jmorl.decision.terminal_view import show_front, show_points
 from jmorl.display.console import PlainConsole
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, DecisionMaker, Question
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker, Question
 
 Utility = Callable[[np.ndarray], np.ndarray]  # objective vectors [N, M] to utilities [N]
 

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from jmorl.decision.protocol import Answer, AnyQuestion, DecisionMaker, PointAnswer, PointQuestion, Question
+from jmorl.decision.answers import Answer, PointAnswer
+from jmorl.decision.protocol import AnyQuestion, DecisionMaker, PointQuestion, Question
 
 
 class Wrapper(DecisionMaker):

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from jmorl.config import Config, ConfigError, resolve
-from jmorl.decision.protocol import Answer, DecisionMaker, Question
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker, Question
 from jmorl.decision.target import TargetUser
 from jmorl.experiments import tables
 from jmorl.experiments.cells import Cell, Places, distinct, known, missing

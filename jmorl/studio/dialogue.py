@@ -5,8 +5,9 @@ from functools import cached_property
 
 from envs.core import Objective
 from jmorl.decision import enautilus
+from jmorl.decision.answers import PointAnswer
 from jmorl.decision.navigation import respond
-from jmorl.decision.protocol import PointAnswer, PointQuestion
+from jmorl.decision.protocol import PointQuestion
 from jmorl.decision.records import PointRecord, point_record
 from jmorl.search.policy import Policy, values_of
 

@@ -3,7 +3,8 @@
 import threading
 from collections.abc import Callable
 
-from jmorl.decision.protocol import Answer, DecisionMaker, Question
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker, Question
 
 
 class LeftOff(Exception):

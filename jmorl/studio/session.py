@@ -15,7 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import envs
-from jmorl.decision.protocol import Answer, PointAnswer, Question
+from jmorl.decision.answers import Answer, PointAnswer
+from jmorl.decision.protocol import Question
 from jmorl.events import RunFinished
 from jmorl.loop import make_method
 from jmorl.report.plots import draw_run

@@ -9,7 +9,8 @@ from typing import Literal, TypeVar
 
 from nicegui import run
 
-from jmorl.decision.protocol import Answer, PointAnswer, PointQuestion, Question
+from jmorl.decision.answers import Answer, PointAnswer
+from jmorl.decision.protocol import PointQuestion, Question
 from jmorl.storage.checkpoints import CheckpointError
 from jmorl.studio import texts
 from jmorl.studio.dialogue import Dialogue

@@ -10,8 +10,9 @@ from hypothesis.extra.numpy import arrays
 from scipy.cluster.hierarchy import fcluster, linkage
 
 from jmorl.decision import enautilus as en
+from jmorl.decision.answers import Adjust, Back, Choose
 from jmorl.decision.navigation import respond, run_enautilus
-from jmorl.decision.protocol import Adjust, Back, Choose, PointQuestion
+from jmorl.decision.protocol import PointQuestion
 from jmorl.decision.target import TargetUser
 from jmorl.decision.utility import UtilityUser, chebyshev_utility, linear_utility
 

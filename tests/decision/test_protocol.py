@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from envs import Objective
-from jmorl.decision.protocol import Answer, AnswerError, Back, Choose, PairQuestion, Question, WeightQuestion
+from jmorl.decision.answers import Answer, AnswerError, Back, Choose
+from jmorl.decision.protocol import PairQuestion, Question, WeightQuestion
 from jmorl.decision.records import ScriptError, from_json, read_log, record_of, to_json
 from jmorl.search.policy import Policy
 

@@ -5,7 +5,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import decision_record, to_json
 from jmorl.decision.remembered import Remembered
 from jmorl.storage.decision_log import DecisionLog

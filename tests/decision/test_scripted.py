@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jmorl.decision.answers import Adjust, Answer, Back, Choose
 from jmorl.decision.navigation import run_enautilus
-from jmorl.decision.protocol import Adjust, Answer, Back, Choose, Question
+from jmorl.decision.protocol import Question
 from jmorl.decision.records import (
     DecisionRecord,
     PointRecord,

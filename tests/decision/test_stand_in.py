@@ -10,7 +10,7 @@ import pytest
 import envs
 from jmorl import Decided, DecisionMaker, PairQuestion, branch, read_run, resume, run
 from jmorl.cli import main
-from jmorl.decision.protocol import Answer
+from jmorl.decision.answers import Answer
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.decision.stand_in import StandIn

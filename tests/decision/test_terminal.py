@@ -9,8 +9,9 @@ import pytest
 
 from envs.core import Objective
 from jmorl.decision import enautilus as en
+from jmorl.decision.answers import Adjust, Answer, Back, Choose
 from jmorl.decision.navigation import run_enautilus
-from jmorl.decision.protocol import Adjust, Answer, Back, Choose, PointQuestion
+from jmorl.decision.protocol import PointQuestion
 from jmorl.decision.terminal import TerminalUser
 from jmorl.display.console import PlainConsole
 

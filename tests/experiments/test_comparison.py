@@ -8,7 +8,8 @@ import pytest
 import jmorl
 from jmorl import Contender, compare
 from jmorl.config import ConfigError
-from jmorl.decision.protocol import Answer, DecisionMaker
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import DecisionMaker
 from jmorl.learning.population import Population, TrainingFault
 from tests.registered import ThreeWays
 

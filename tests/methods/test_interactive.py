@@ -8,7 +8,7 @@ import pytest
 
 import envs
 from jmorl import Decided, GenerationFinished, read_run, run
-from jmorl.decision.protocol import Answer
+from jmorl.decision.answers import Answer
 from jmorl.loop import make_method
 from jmorl.search.bounds import within
 from jmorl.search.policy import values_of

@@ -9,7 +9,7 @@ import pytest
 
 from jmorl import Decided, DecisionMaker, GenerationFinished, Method, MethodError, PairQuestion, WeightQuestion, run
 from jmorl.config import ConfigError
-from jmorl.decision.protocol import Answer, AnswerError
+from jmorl.decision.answers import Answer, AnswerError
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.methods import registry
 from jmorl.methods.pgmorl import PGMORL

@@ -9,7 +9,8 @@ import pytest
 
 from envs.core import Objective
 from jmorl.config import resolve
-from jmorl.decision.protocol import Answer, Question
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import Question
 from jmorl.decision.records import decision_record
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, RunFinished, Seconds
 from jmorl.methods.pgmorl import PGMORLState

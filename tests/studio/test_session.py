@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import envs
-from jmorl.decision.protocol import Answer, Choose
+from jmorl.decision.answers import Answer, Choose
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.search.policy import values_of
 from jmorl.storage.afterwards import choose_afterwards

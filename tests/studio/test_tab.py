@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from jmorl.decision.protocol import Answer, Choose
+from jmorl.decision.answers import Answer, Choose
 from jmorl.studio import texts
 from jmorl.studio.tab import Tab
 

@@ -2,8 +2,9 @@
 
 from nicegui import ui
 
+from jmorl.decision.answers import Adjust, Back, Choose
 from jmorl.decision.enautilus import IntermediatePoint
-from jmorl.decision.protocol import Adjust, Back, Choose, PointQuestion
+from jmorl.decision.protocol import PointQuestion
 from jmorl.display.text import objective_label, plural
 from jmorl.search.scaling import range_scale
 from jmorl.studio import texts

@@ -3,7 +3,8 @@
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from jmorl.decision.protocol import Answer, Question
+from jmorl.decision.answers import Answer
+from jmorl.decision.protocol import Question
 from jmorl.studio import texts
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
