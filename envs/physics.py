@@ -20,7 +20,7 @@ class Physics(Protocol):
     def advance(self, state: BodyState, control: jax.Array, substeps: int) -> tuple[BodyState, jax.Array]:
         """Apply `control` [nu] for `substeps` time steps. Returns the state, and the displacement [nv].
 
-        The displacement is the sum of `timestep * qvel` over the substeps: it keeps its digits far from the
+        The displacement is the sum of what each substep adds to the positions: it keeps its digits far from the
         origin, where a difference of positions does not.
         """
         ...

@@ -9,10 +9,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from envs.planar.kinematics import Kinematics
 from envs.planar.model import Constraints, PlanarModel
-from envs.planar.tree import constant
+from envs.planar.tree import constant, pick
+
+TINY = 1e-30  # square metres: less than any length of a model
 
 
 class Contacts(NamedTuple):
@@ -26,6 +29,16 @@ class Contacts(NamedTuple):
     friction: jax.Array  # [slots, 1] mu
 
 
+class Touching(NamedTuple):
+    """Capsules against each other: [K, batch] each, but where both are told about."""
+
+    x: jax.Array  # [2, K, batch] contact point about the hinge of either body, half-way into the overlap
+    z: jax.Array  # [2, K, batch]
+    normal: jax.Array  # [2, K, batch] x and z, from the first to the second
+    strength: jax.Array  # D; 0 where they do not touch
+    reference: jax.Array
+
+
 class Limits(NamedTuple):
     """The hinges' limits, one row for the nearer one: [V - 2, batch] each."""
 
@@ -36,10 +49,10 @@ class Limits(NamedTuple):
 
 def contacts(model: PlanarModel, moving: Kinematics) -> Contacts:
     """Return the contacts of a state."""
-    radius = constant(model.contact_distance, moving.end)
+    begins, margin = constant(model.contact_distance, moving.end), constant(model.contact_margin, moving.end)
     x, end_z = moving.end
-    depth = radius + model.ground - moving.height - moving.hinge[1] - end_z  # positive in the ground
-    half = 0.5 * depth - radius  # from the end up to the contact point
+    depth = begins + model.ground - moving.height - moving.hinge[1] - end_z  # positive where it acts
+    half = 0.5 * (depth + margin) - begins  # from the end up to the contact point, half-way into the overlap
     velocity_x, velocity_z = moving.end_velocity
     velocity_x = velocity_x + moving.turning * half
     impedance = _impedance(model.contact, depth)
@@ -52,6 +65,105 @@ def contacts(model: PlanarModel, moving: Kinematics) -> Contacts:
         reference_z=-damping * velocity_z + constant(model.contact.stiffness, x) * impedance * depth,
         friction=constant(model.friction, x),
     )
+
+
+def mutual_contacts(model: PlanarModel, moving: Kinematics) -> Touching:
+    """Return the contacts of pairs of capsules.
+
+    In a plane the closest points of two axes that do not cross include an end of one. Axes that cross have no
+    direction in the plane to push each other in, and MuJoCo's contact is without effect, too. It has two contacts
+    between axes that are parallel to the last digits, where here is one.
+    """
+    pairs = model.pairs
+    if not pairs.count:
+        none = moving.height[None][:0]
+        return Touching(*(jnp.stack([none, none]),) * 3, none, none)
+    end = moving.hinge[:, None] + moving.end  # [2, 2 ends, slots, batch] about O
+    first, second = (pick(end, slots) for slots in pairs.slots)
+    gap, here, there = _closest(first, second)
+    radius = constant(pairs.radius, gap)
+    length = jnp.sqrt(jnp.maximum((gap * gap).sum(axis=0), TINY))
+    normal = gap / length
+    depth = radius.sum(axis=0) + constant(pairs.margin, gap) - length
+    depth = jnp.where(_cross(first, second), -1.0, depth)
+    point = 0.5 * (here + there + normal * (radius[0] - radius[1]))
+    about = jnp.stack([point - pick(moving.hinge, slots) for slots in pairs.slots], axis=1)  # [2, 2 bodies, K, batch]
+    velocity = []
+    for slots, place in zip(pairs.slots, (point - pick(end[:, 0], slots) for slots in pairs.slots), strict=True):
+        turning = pick(moving.turning, slots)
+        along = pick(moving.end_velocity[:, 0], slots)
+        velocity.append(jnp.stack([along[0] + turning * place[1], along[1] - turning * place[0]]))
+    approach = ((velocity[1] - velocity[0]) * normal).sum(axis=0)
+    impedance = _impedance(pairs.contact, depth)
+    return Touching(
+        x=about[0],
+        z=about[1],
+        normal=normal,
+        strength=_strength(pairs.contact, impedance, depth),
+        reference=-constant(pairs.contact.damping, depth) * approach
+        + constant(pairs.contact.stiffness, depth) * impedance * depth,
+    )
+
+
+def _closest(first: jax.Array, second: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Return the shortest way from one segment to another [2, 2 ends, K, batch], where it begins, and where it ends.
+
+    They do not cross. Each is [2, K, batch].
+    """
+    ways = []
+    for points, segment, sign in ((first, second, 1.0), (second, first, -1.0)):
+        start, along = segment[:, 0], segment[:, 1] - segment[:, 0]
+        for point in (points[:, 0], points[:, 1]):
+            square = jnp.maximum((along * along).sum(axis=0), TINY)
+            share = jnp.clip(((point - start) * along).sum(axis=0) / square, 0.0, 1.0)
+            nearest = start + share * along
+            ends = (point, nearest) if sign > 0 else (nearest, point)
+            ways.append(jnp.broadcast_arrays(ends[1] - ends[0], *ends))
+    best = jnp.stack(ways[0])
+    for way in map(jnp.stack, ways[1:]):
+        best = jnp.where((way[0] ** 2).sum(axis=0) < (best[0] ** 2).sum(axis=0), way, best)
+    gap, here, there = best
+    return gap, here, there
+
+
+def _cross(first: jax.Array, second: jax.Array) -> jax.Array:
+    """Whether segments [2, 2 ends, K, batch] cross, [K, batch]."""
+
+    def sides(segment: jax.Array, points: jax.Array) -> jax.Array:
+        along, offset = segment[:, 1] - segment[:, 0], points - segment[:, :1]
+        return along[0] * offset[1] - along[1] * offset[0]  # [2 ends, K, batch]
+
+    apart = [sides(one, other).prod(axis=0) < 0 for one, other in ((first, second), (second, first))]
+    return apart[0] & apart[1]
+
+
+def mutual_residuals(model: PlanarModel, pushing: Touching, motion: jax.Array) -> jax.Array:
+    """Residuals [K, batch] of the pairs' rows, at the bodies' accelerations [3, slots, batch]."""
+    if not model.pairs.count:
+        return pushing.reference
+    return mutual_partings(model, pushing, motion) - pushing.reference
+
+
+def mutual_partings(model: PlanarModel, pushing: Touching, motion: jax.Array) -> jax.Array:
+    """Return how fast the second of each pair leaves the first along the normal [K, batch], or accelerates from it."""
+    along = []
+    for side, slots in enumerate(model.pairs.slots):
+        w, u, v = pick(motion, slots)
+        along.append(pushing.normal[0] * (u + w * pushing.z[side]) + pushing.normal[1] * (v - w * pushing.x[side]))
+    return along[1] - along[0]
+
+
+def mutual_pushes(model: PlanarModel, pushing: Touching) -> jax.Array:
+    """Return what each pair's row does to the bodies: moment and force [3, slots, K, batch] about their hinges."""
+    shape = 3, len(model.contact_distance), *pushing.strength.shape
+    pushes = jnp.zeros_like(jnp.broadcast_to(pushing.strength, shape))
+    for side, sign in enumerate((-1.0, 1.0)):
+        force_x, force_z = sign * pushing.normal
+        moment = force_x * pushing.z[side] - force_z * pushing.x[side]
+        pushes = pushes.at[:, model.pairs.slots[side], np.arange(model.pairs.count)].set(
+            jnp.stack([moment, force_x, force_z])
+        )
+    return pushes
 
 
 def limits(model: PlanarModel, qpos: jax.Array, qvel: jax.Array) -> Limits:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from envs.planar.support import capsule_axis, collide, prevailing, unsupported
+from envs.planar.support import capsule_axis, collide, meet, prevailing, unsupported
 
 FAR = 1e6  # radians or metres: a limit that is never reached, and finite so that it never makes a NaN
 # MuJoCo's bounds of solimp: least, greatest, width, midpoint, power.
@@ -36,6 +36,21 @@ class Constraints:
     stiffness: np.ndarray  # [...] K of the reference acceleration -B v - K I(d) d
     damping: np.ndarray  # [...] B
     diagonal: np.ndarray  # [...] diagApprox: regularisation is diagonal * (1 - I) / I
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Capsules of two bodies that can touch each other, without friction. K pairs."""
+
+    slots: np.ndarray  # [2, K] of the first and the second
+    radius: np.ndarray  # [2, K]
+    margin: np.ndarray  # [K] distance at which a contact begins
+    contact: Constraints  # [K]
+
+    @property
+    def count(self) -> int:
+        """K."""
+        return len(self.margin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +83,7 @@ class PlanarModel:
     """
 
     timestep: float
+    runge_kutta: bool  # of fourth order; otherwise Euler with implicit joint damping
     gravity: float  # downwards
     dofs: np.ndarray  # [V] index in MuJoCo's order of each degree of freedom
     levels: tuple[Level, ...]
@@ -78,10 +94,12 @@ class PlanarModel:
     slot_ends: np.ndarray  # [2, 2 ends, slots] of the capsule, in the body's frame
     slot_mass: np.ndarray  # [slots]
     slot_inertia: np.ndarray  # [slots] about the centre of mass
-    contact_distance: np.ndarray  # [slots] height of a capsule end at which its contact begins
+    contact_distance: np.ndarray  # [slots] height of a capsule end at which its contact begins: its radius and margin
+    contact_margin: np.ndarray  # [slots] distance at which a contact begins
     ground: float  # height of the plane
     friction: np.ndarray  # [slots]
     contact: Constraints  # [slots]
+    pairs: Pairs
     joint_stiffness: np.ndarray  # [V]
     joint_rest: np.ndarray  # [V]
     joint_damping: np.ndarray  # [V]
@@ -104,14 +122,17 @@ def compile_model(model: mujoco.MjModel) -> PlanarModel:
     if problems:
         raise UnsupportedModel(problems)
     bodies, levels = _levels(model)
+    slots = [slot for body in bodies for slot in _slots_of(model, body)]
     root = bodies[0]
     return PlanarModel(
         timestep=float(model.opt.timestep),
+        runge_kutta=bool(model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4),
         gravity=-float(model.opt.gravity[2]),
         levels=levels,
         root_position=_plane(model.body_pos[root]) + _plane(model.jnt_pos[_hinge(model, root)]) - model.qpos0[:2],
+        pairs=_pairs(model, slots),
         **_joints(model, [_hinge(model, body) for body in bodies]),
-        **_slots(model, [slot for body in bodies for slot in _slots_of(model, body)]),
+        **_slots(model, slots),
         **_actuators(model, bodies),
     )
 
@@ -141,20 +162,45 @@ def _slots(model: mujoco.MjModel, slots: list[_Slot]) -> dict[str, Any]:
     """Return the fields about slots."""
     floor = _floor(model)
     bodies = [slot.body for slot in slots]
+    touches = [slot.capsule is not None and collide(model, slot.capsule, floor) for slot in slots]
     capsules = [floor if slot.capsule is None else slot.capsule for slot in slots]
-    radius = [-FAR if slot.capsule is None else model.geom_size[slot.capsule, 0] for slot in slots]
+    margin = model.geom_margin[capsules] + model.geom_margin[floor]
+    radius = np.where(touches, model.geom_size[capsules, 0], -FAR)
     sliding = [prevailing(model, model.geom_friction[:, 0], capsule, floor) for capsule in capsules]
     friction = np.maximum(LEAST_FRICTION, sliding)
+    weight = model.body_invweight0[bodies, 0] + model.body_invweight0[0, 0]
+    diagonal = weight * (1 + friction**2) * 2 * friction**2 / model.opt.impratio  # of a pyramidal cone of condim 3
     return {
         "slot_centre": np.stack([_centre(model, body) for body in bodies], axis=-1),
         "slot_ends": np.stack([_ends(model, slot) for slot in slots], axis=-1),
         "slot_mass": np.array([slot.first * model.body_mass[slot.body] for slot in slots]),
         "slot_inertia": np.array([slot.first * _inertia(model, slot.body) for slot in slots]),
-        "contact_distance": np.array(radius),
+        "contact_distance": radius + margin,
+        "contact_margin": margin,
         "ground": float(model.geom_pos[floor, 2]),
         "friction": friction,
-        "contact": _contact_constraints(model, bodies, capsules, friction),
+        "contact": _contact_constraints(model, [(capsule, floor) for capsule in capsules], diagonal),
     }
+
+
+def _pairs(model: mujoco.MjModel, slots: list[_Slot]) -> Pairs:
+    """Return the pairs of slots whose capsules can touch each other."""
+    found = [
+        (one, other)
+        for other, second in enumerate(slots)
+        for one, first in enumerate(slots[:other])
+        if first.capsule is not None and second.capsule is not None and meet(model, first.capsule, second.capsule)
+    ]
+    index = np.array(found, int).reshape(-1, 2)
+    capsules = [(int(slots[one].capsule or 0), int(slots[other].capsule or 0)) for one, other in found]
+    geoms = np.array(capsules, int).reshape(-1, 2).T
+    weight = model.body_invweight0[model.geom_bodyid[geoms], 0].sum(axis=0)
+    return Pairs(
+        slots=index.T,
+        radius=model.geom_size[geoms, 0],
+        margin=model.geom_margin[geoms].sum(axis=0),
+        contact=_contact_constraints(model, capsules, weight),
+    )
 
 
 def _actuators(model: mujoco.MjModel, bodies: list[int]) -> dict[str, Any]:
@@ -203,10 +249,9 @@ def _hinge(model: mujoco.MjModel, body: int) -> int:
 
 
 def _slots_of(model: mujoco.MjModel, body: int) -> list[_Slot]:
-    """One for each capsule of a body that can touch the ground, or one without."""
-    floor = _floor(model)
+    """One for each capsule of a body that can touch anything, or one without."""
     geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
-    capsules: list[int | None] = [geom for geom in geoms if collide(model, geom, floor)]
+    capsules: list[int | None] = [geom for geom in geoms if any(meet(model, geom, each) for each in range(model.ngeom))]
     return [_Slot(body, capsule, index == 0) for index, capsule in enumerate(capsules or [None])]
 
 
@@ -256,19 +301,14 @@ def _ends(model: mujoco.MjModel, slot: _Slot) -> np.ndarray:
     return np.stack([middle + half, middle - half], axis=-1)
 
 
-def _contact_constraints(
-    model: mujoco.MjModel, bodies: list[int], capsules: list[int], friction: np.ndarray
-) -> Constraints:
-    """MuJoCo's mixture of two geoms' parameters, for a pyramidal cone of condim 3."""
-    floor = _floor(model)
-    solref, solimp = [], []
-    for capsule in capsules:
-        share = _share(model, capsule, floor)
-        solref.append(share * model.geom_solref[capsule] + (1 - share) * model.geom_solref[floor])
-        solimp.append(share * model.geom_solimp[capsule] + (1 - share) * model.geom_solimp[floor])
-    weight = model.body_invweight0[bodies, 0] + model.body_invweight0[0, 0]
-    diagonal = weight * (1 + friction**2) * 2 * friction**2 / model.opt.impratio
-    return _constraints(model.opt, np.array(solref), np.array(solimp), diagonal)
+def _contact_constraints(model: mujoco.MjModel, pairs: list[tuple[int, int]], diagonal: np.ndarray) -> Constraints:
+    """MuJoCo's mixture of the parameters of pairs of geoms [n], and their diagonal [n]."""
+    solref, solimp = [np.zeros((0, 2))], [np.zeros((0, 5))]
+    for one, other in pairs:
+        share = _share(model, one, other)
+        solref.append(share * model.geom_solref[[one]] + (1 - share) * model.geom_solref[[other]])
+        solimp.append(share * model.geom_solimp[[one]] + (1 - share) * model.geom_solimp[[other]])
+    return _constraints(model.opt, np.concatenate(solref), np.concatenate(solimp), diagonal)
 
 
 def _share(model: mujoco.MjModel, one: int, other: int) -> float:

@@ -71,8 +71,8 @@ class PlanarPhysics:
 
         def substep(carry: tuple[jax.Array, ...], _: None) -> tuple[tuple[jax.Array, ...], None]:
             qpos, qvel, displacement = carry
-            qpos, qvel = time_step(self.model, qpos, qvel, drive)
-            return (qpos, qvel, displacement + self.model.timestep * qvel), None
+            moved = time_step(self.model, qpos, qvel, drive)
+            return (moved.qpos, moved.qvel, displacement + moved.displacement), None
 
         start: tuple[jax.Array, ...] = (qpos, qvel, jnp.zeros_like(qvel))
         return jnp.stack(jax.lax.scan(substep, start, None, length=substeps)[0])

@@ -19,9 +19,13 @@ import jax.numpy as jnp
 from envs.planar.constraints import (
     Contacts,
     Limits,
+    Touching,
     contact_residuals,
     contact_stiffness,
     limit_residuals,
+    mutual_partings,
+    mutual_pushes,
+    mutual_residuals,
 )
 from envs.planar.kinematics import Kinematics
 from envs.planar.model import Level, PlanarModel
@@ -145,25 +149,29 @@ class _Point(NamedTuple):
     motion: jax.Array  # [3, slots, batch]
     contact: jax.Array  # [3, 2 ends, slots, batch] residuals
     limit: jax.Array  # [V - 2, batch] residuals
+    mutual: jax.Array  # [K, batch] residuals
 
 
-def constrained(
-    model: PlanarModel,
-    moving: Kinematics,
-    touching: Contacts,
-    stops: Limits,
-    bodies: jax.Array,
-    joints: Joints,
-) -> Solution:
+class Rows(NamedTuple):
+    """All constraints of a batch of states."""
+
+    ground: Contacts
+    stops: Limits
+    pushing: Touching
+
+
+def constrained(model: PlanarModel, moving: Kinematics, rows: Rows, bodies: jax.Array, joints: Joints) -> Solution:
     """Newton's method from zero acceleration, with full steps.
 
     A full step depends on the active rows alone, so a state whose active rows no longer change has arrived, exactly,
     and stays where it is while the rest of the batch goes on. Full steps may cycle: after `FULL_STEPS` each is halved
     until the cost still falls at its end, and as the cost is convex, they arrive.
     """
+    ground, stops, pushing = rows
 
     def point(qacc: jax.Array, motion: jax.Array) -> _Point:
-        return _Point(qacc, motion, contact_residuals(touching, motion), limit_residuals(stops, qacc))
+        mutual = mutual_residuals(model, pushing, motion)
+        return _Point(qacc, motion, contact_residuals(ground, motion), limit_residuals(stops, qacc), mutual)
 
     def step(carry: tuple[jax.Array, jax.Array, _Point]) -> tuple[jax.Array, jax.Array, _Point]:
         count, _, start = carry
@@ -171,15 +179,16 @@ def constrained(
         none = jnp.zeros_like(joints.force[:2])
         diagonal = joints.inertia + jnp.concatenate([none, held])
         force = joints.force + jnp.concatenate([none, stops.direction * held * stops.reference])
-        stiff = bodies + contact_stiffness(touching, start.contact < 0)
-        end = point(*accelerations(model, moving.offsets, stiff, Joints(diagonal, force)))
-        changed = _any(((end.contact < 0) != (start.contact < 0)) & (touching.strength > 0)) | _any(
-            ((end.limit < 0) != (start.limit < 0)) & (stops.strength > 0)
-        )
+        stiff = bodies + contact_stiffness(ground, start.contact < 0)
+        pressed = jnp.where(start.mutual < 0, pushing.strength, 0.0)
+        end = point(*_accelerations_with_pairs(model, moving, pushing, pressed, stiff, Joints(diagonal, force)))
+        changed = _any(((end.contact < 0) != (start.contact < 0)) & (ground.strength > 0))
+        changed |= _any(((end.limit < 0) != (start.limit < 0)) & (stops.strength > 0))
+        changed |= _any(((end.mutual < 0) != (start.mutual < 0)) & (pushing.strength > 0))
         back = jax.lax.cond(
             count < FULL_STEPS,
             lambda: jnp.zeros_like(end.qacc[0]),
-            lambda: 1 - _share(touching, stops, bodies, joints, start, end),
+            lambda: 1 - _share(rows, bodies, joints, start, end),
         )
         reached = [there + back * (here - there) for here, there in zip(start, end, strict=True)]
         return count + 1, changed, _Point(*reached)
@@ -193,31 +202,79 @@ def constrained(
     return Solution(found.qacc, count)
 
 
-def _share(
-    touching: Contacts, stops: Limits, bodies: jax.Array, joints: Joints, start: _Point, end: _Point
-) -> jax.Array:  # [batch]
+def _accelerations_with_pairs(
+    model: PlanarModel, moving: Kinematics, pushing: Touching, pressed: jax.Array, bodies: jax.Array, joints: Joints
+) -> tuple[jax.Array, jax.Array]:
+    """Return `accelerations` where pairs of bodies also push each other apart, each as stiff as `pressed` [K, batch].
+
+    A pair couples two branches of the tree: its `J' D J` has rank one, and corrects the elimination along the tree
+    (Woodbury). Nearly always no pair of the whole batch touches, and nothing is to be corrected.
+    """
+    qacc, motion = accelerations(model, moving.offsets, bodies, joints)
+    count = model.pairs.count
+    if not count:
+        return qacc, motion
+
+    def corrected() -> tuple[jax.Array, jax.Array]:
+        # All pairs' unit pushes at once: the batch K times, one pair in each.
+        def repeated(array: jax.Array) -> jax.Array:
+            return jnp.concatenate([array] * count, axis=-1)
+
+        pushes = mutual_pushes(model, pushing)  # [3, slots, K, batch]
+        pushed = jnp.concatenate([repeated(bodies[:6]), pushes.reshape(*pushes.shape[:2], -1)])
+        free = Joints(repeated(joints.inertia), jnp.zeros_like(repeated(joints.force)))
+        found = accelerations(model, tuple(map(repeated, moving.offsets)), pushed, free)
+        by_push = [each.reshape(*each.shape[:-1], count, -1) for each in found]  # [..., K, batch]
+        root = jnp.sqrt(pressed)
+        partings = [mutual_partings(model, pushing, by_push[1][..., pair, :]) for pair in range(count)]
+        coupling = root[:, None] * jnp.stack(partings, axis=1) * root  # [K, K, batch]
+        wanted = root * mutual_residuals(model, pushing, motion)
+        held = root * _solved(coupling + jnp.eye(count, dtype=root.dtype)[..., None], wanted)
+        first, second = ((held * each).sum(axis=-2) for each in by_push)
+        return qacc - first, motion - second
+
+    return jax.lax.cond(_any(pressed > 0), corrected, lambda: (qacc, motion))
+
+
+def _solved(matrix: jax.Array, right: jax.Array) -> jax.Array:  # [K, K, batch], [K, batch] -> [K, batch]
+    """Solve symmetric positive definite systems, written out, as K is small."""
+    count = len(right)
+    rows, sides = [matrix[each] for each in range(count)], [right[each] for each in range(count)]
+    for pivot in range(count):
+        for below in range(pivot + 1, count):
+            factor = rows[below][pivot] / rows[pivot][pivot]
+            rows[below] = rows[below] - factor * rows[pivot]
+            sides[below] = sides[below] - factor * sides[pivot]
+    found: list[jax.Array] = [jnp.zeros_like(right[0])] * count
+    for pivot in reversed(range(count)):
+        known = sum((rows[pivot][each] * found[each] for each in range(pivot + 1, count)), jnp.zeros_like(right[0]))
+        found[pivot] = (sides[pivot] - known) / rows[pivot][pivot]
+    return jnp.stack(found)
+
+
+def _share(rows: Rows, bodies: jax.Array, joints: Joints, start: _Point, end: _Point) -> jax.Array:  # [batch]
     """How much of Newton's step from `start` to `end` to take: the most of 1, 1/2, 1/4, ... at which the cost falls.
 
     The cost's slope along the step is the inertia's, linear in the share taken, and the rows', linear while active. It
     would be zero at the end if the rows active at the start stayed the active ones.
     """
-    qacc, motion, contact, limit = (there - here for here, there in zip(start, end, strict=True))
+    qacc, motion, contact, limit, mutual = (there - here for here, there in zip(start, end, strict=True))
     ww, wu, wv, uu, uv, vv = bodies[:6]
     w, u, v = motion
     inertia = _sum(w * (ww * w + 2 * (wu * u + wv * v)) + u * (uu * u + 2 * uv * v) + vv * v * v)
     inertia = inertia + _sum(joints.inertia * qacc * qacc)
     edges = jnp.array([1.0, 1.0, 2.0], contact.dtype)[:, None, None, None]  # n counts twice
-    contact, limit = edges * touching.strength * contact, stops.strength * limit
+    strengths = edges * rows.ground.strength, rows.stops.strength, rows.pushing.strength
+    steps = [strength * change for strength, change in zip(strengths, (contact, limit, mutual), strict=True)]
 
-    def rows(contact_residuals: jax.Array, limit_residuals: jax.Array) -> jax.Array:
-        return _sum(contact * contact_residuals) + _sum(limit * limit_residuals)
+    def total(residuals: list[jax.Array]) -> jax.Array:
+        return sum((_sum(step * each) for step, each in zip(steps, residuals, strict=True)), jnp.zeros_like(inertia))
 
-    assumed = rows(jnp.where(start.contact < 0, end.contact, 0.0), jnp.where(start.limit < 0, end.limit, 0.0))
+    assumed = total([jnp.where(here < 0, there, 0.0) for here, there in zip(start[2:], end[2:], strict=True)])
 
     def slope(share: jax.Array) -> jax.Array:
-        at = [there + (1 - share) * (here - there) for here, there in zip(start, end, strict=True)]
-        active = rows(jnp.minimum(at[2], 0.0), jnp.minimum(at[3], 0.0))
-        return active - assumed - (1 - share) * inertia
+        at = [there + (1 - share) * (here - there) for here, there in zip(start[2:], end[2:], strict=True)]
+        return total([jnp.minimum(each, 0.0) for each in at]) - assumed - (1 - share) * inertia
 
     def halve(_: jax.Array, share: jax.Array) -> jax.Array:
         return jnp.where(slope(share) > 0, 0.5 * share, share)

@@ -17,8 +17,6 @@ ABSENT = {
     "jnt_springyield": "a yielding spring",
     "jnt_actfrclimited": "a limited actuator force",
     "jnt_actgravcomp": "gravity compensation",
-    "geom_margin": "a contact margin",
-    "geom_gap": "a contact gap",
     "geom_surfacevel": "a surface velocity",
     "geom_adhesion": "adhesion",
     "dof_frictionloss": "dry friction",
@@ -68,6 +66,13 @@ def collide(model: mujoco.MjModel, one: int, other: int) -> bool:
     return bool(kind[one] & affinity[other]) or bool(kind[other] & affinity[one])
 
 
+def meet(model: mujoco.MjModel, one: int, other: int) -> bool:
+    """Whether two geoms can touch: not those of one body, nor of a body that moves and its parent."""
+    a, b = int(model.geom_bodyid[one]), int(model.geom_bodyid[other])
+    related = a == b or (a and b and (model.body_parentid[a] == b or model.body_parentid[b] == a))
+    return not related and collide(model, one, other)
+
+
 def prevailing(model: mujoco.MjModel, values: np.ndarray, one: int, other: int) -> float:
     """Which of two touching geoms' values their contact has: of the geom with priority, else the greater."""
     priority = model.geom_priority[[one, other]]
@@ -83,8 +88,8 @@ def capsule_axis(model: mujoco.MjModel, geom: int) -> np.ndarray:  # [3]
 
 def _options(model: mujoco.MjModel) -> Iterator[str]:
     option = model.opt
-    if option.integrator != mujoco.mjtIntegrator.mjINT_EULER:
-        yield f"integrator {mujoco.mjtIntegrator(option.integrator).name}, not Euler"
+    if option.integrator not in (mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_RK4):
+        yield f"integrator {mujoco.mjtIntegrator(option.integrator).name}, neither Euler nor RK4"
     if option.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
         yield "an elliptic friction cone, not a pyramidal one"
     if option.gravity[0] or option.gravity[1]:
@@ -154,8 +159,11 @@ def _contacts(model: mujoco.MjModel) -> Iterator[str]:
         if geom == floor or (model.geom_bodyid[geom] and collide(model, geom, floor)):
             yield from (f"{name(model, 'GEOM', geom)}: {problem}" for problem in _ground_contact(model, geom, floor))
         for other in range(geom):
-            if floor not in (geom, other) and _meet(model, geom, other):
-                yield f"{name(model, 'GEOM', other)} and {name(model, 'GEOM', geom)}: geoms that touch each other"
+            if floor not in (geom, other) and meet(model, geom, other):
+                both = f"{name(model, 'GEOM', other)} and {name(model, 'GEOM', geom)}"
+                yield from (
+                    f"{both}: touch each other, and {problem}" for problem in _mutual_contact(model, geom, other)
+                )
 
 
 def _ground_contact(model: mujoco.MjModel, geom: int, floor: int) -> Iterator[str]:
@@ -165,17 +173,29 @@ def _ground_contact(model: mujoco.MjModel, geom: int, floor: int) -> Iterator[st
         return
     if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
         yield "not a capsule, and touches the ground"
-    elif abs(capsule_axis(model, geom)[1]) > 1e-12:
+    elif _leans(model, geom):
         yield "out of the plane (x, z)"
     if prevailing(model, model.geom_condim, geom, floor) != 3:
         yield "condim is not 3"
 
 
-def _meet(model: mujoco.MjModel, one: int, other: int) -> bool:
-    """Whether two geoms may touch: not of one body, nor of a body that moves and its parent."""
-    a, b = int(model.geom_bodyid[one]), int(model.geom_bodyid[other])
-    related = a == b or (a and b and (model.body_parentid[a] == b or model.body_parentid[b] == a))
-    return not related and collide(model, one, other)
+def _mutual_contact(model: mujoco.MjModel, one: int, other: int) -> Iterator[str]:
+    geoms = [one, other]
+    if not model.geom_bodyid[geoms].all():
+        yield "one of them is of the world"
+        return
+    if (model.geom_type[geoms] != mujoco.mjtGeom.mjGEOM_CAPSULE).any():
+        yield "not both are capsules"
+    elif any(_leans(model, geom) for geom in geoms) or not np.isclose(*model.geom_pos[geoms, 1]):
+        yield "not in one plane"
+    if prevailing(model, model.geom_condim, one, other) != 1:
+        yield "condim is not 1"
+    if (model.geom_solref[geoms] <= 0).any():
+        yield "solref is in direct form"
+
+
+def _leans(model: mujoco.MjModel, capsule: int) -> bool:
+    return bool(abs(capsule_axis(model, capsule)[1]) > 1e-12)
 
 
 def _turns_about_y(quaternion: np.ndarray) -> bool:

@@ -35,6 +35,8 @@ class Stages(NamedTuple):
     contact_reference: np.ndarray  # [N, C, 2 ends, 2] efc_aref of the edges that lean along +x and -x
     limit_strength: np.ndarray  # [N, V] efc_D
     limit_reference: np.ndarray  # [N, V] efc_aref
+    mutual_strength: np.ndarray  # [N, K pairs] efc_D of capsules that touch each other
+    mutual_reference: np.ndarray  # [N, K] efc_aref
     qacc: np.ndarray  # [N, V]
     next_qpos: np.ndarray  # [N, V]
     next_qvel: np.ndarray  # [N, V]
@@ -75,6 +77,7 @@ def _stages(model, data, qpos, qvel, control):
         *inverted,
         *_contacts(model, data, ends, origin),
         *_limits(model, data),
+        *_mutual(model, data),
         data.qacc.copy(),
     )
     mujoco.mj_step(model, data)
@@ -83,9 +86,27 @@ def _stages(model, data, qpos, qvel, control):
 
 def capsules_of(model: mujoco.MjModel) -> np.ndarray:
     """Ids of the capsules that can touch the ground."""
-    floor = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)[0]
+    floor = floor_of(model)
     meets = (model.geom_contype & model.geom_conaffinity[floor]) | (model.geom_conaffinity & model.geom_contype[floor])
     return np.flatnonzero((model.geom_bodyid > 0) & (meets > 0))
+
+
+def floor_of(model: mujoco.MjModel) -> int:
+    """Id of the ground."""
+    return int(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)[0])
+
+
+def pairs_of(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    """Ids of the capsules that can touch each other, the second ascending, then the first."""
+    capsules = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE).tolist()
+    return [(one, other) for other in capsules for one in capsules if one < other and _can_touch(model, one, other)]
+
+
+def _can_touch(model, one, other):
+    first, second = model.geom_bodyid[[one, other]]
+    kin = first == second or model.body_parentid[first] == second or model.body_parentid[second] == first
+    kind, affinity = model.geom_contype, model.geom_conaffinity
+    return not kin and bool(kind[one] & affinity[other] or kind[other] & affinity[one])
 
 
 def _put(model, data, qpos, qvel, control):
@@ -102,7 +123,10 @@ def _contacts(model, data, ends, origin):
     capsules = capsules_of(model).tolist()
     shape = (len(capsules), 2)
     position, distance, strength, reference = (np.zeros((*shape, *more)) for more in ((2,), (), (), (2,)))
+    floor = floor_of(model)
     for contact in data.contact:
+        if contact.exclude or floor not in contact.geom:
+            continue
         capsule = capsules.index(max(contact.geom))
         radius = model.geom_size[max(contact.geom), 0]
         middle = ends[capsule] - np.array([0, 0, 1]) * (radius + 0.5 * contact.dist)  # of the overlap, were it this end
@@ -115,6 +139,18 @@ def _contacts(model, data, ends, origin):
         order = [along, along + 1] if tangent.sum() > 0 else [along + 1, along]
         reference[at] = data.efc_aref[rows][order]
     return position, distance, strength, reference
+
+
+def _mutual(model, data):
+    """Strength and reference of every pair of capsules; of the contact that comes first, were there two."""
+    pairs = pairs_of(model)
+    strength, reference = np.zeros(len(pairs)), np.zeros(len(pairs))
+    for contact in reversed(data.contact):
+        row, geoms = contact.efc_address, tuple(sorted(contact.geom))
+        # Axes that cross give a direction out of the plane, and a row without effect.
+        if geoms in pairs and row >= 0 and np.abs(contact.frame[1]) < 0.5:
+            strength[pairs.index(geoms)], reference[pairs.index(geoms)] = data.efc_D[row], data.efc_aref[row]
+    return strength, reference
 
 
 def _limits(model, data):

@@ -67,9 +67,11 @@ def forwarded(model: PlanarModel, qpos: jax.Array, qvel: jax.Array, control: jax
 def _stages(
     model: mujoco.MjModel, planar: PlanarModel, qpos: jax.Array, qvel: jax.Array, control: jax.Array
 ) -> tuple[jax.Array, ...]:
-    moving, touching, stops, bodies, smooth, solution = forwarded(planar, qpos, qvel, control)
+    moving, (touching, stops, pushing), bodies, smooth, solution = forwarded(planar, qpos, qvel, control)
     centre_slot, capsule_slot = _slots(model, planar)
     joint = np.argsort(planar.dofs)
+    capsule = np.argsort(capsule_slot)[planar.pairs.slots]  # of each pair, by the order of the capsules
+    pair = np.lexsort(np.sort(capsule, axis=0))
 
     def accelerated(pulled: jax.Array, force: jax.Array) -> jax.Array:
         return accelerations(planar, moving.offsets, pulled, Joints(smooth.inertia, force))[0][joint].T
@@ -77,7 +79,7 @@ def _stages(
     at_rest = jnp.concatenate([bodies[:6], jnp.zeros_like(bodies[6:])])
     ends = moving.hinge[:, None] + moving.end
     points = moving.hinge[:, None] + jnp.stack([touching.x, touching.z])
-    distance = ends[1] + moving.height - planar.ground - planar.contact_distance[:, None]
+    distance = ends[1] + moving.height - planar.ground - (planar.contact_distance - planar.contact_margin)[:, None]
     touches, held = touching.strength > 0, stops.strength > 0
     along = touching.friction * touching.reference_x
     edges = jnp.stack([touching.reference_z + along, touching.reference_z - along])
@@ -94,6 +96,8 @@ def _stages(
         jnp.where(touches, edges, 0.0)[:, :, capsule_slot].T,
         jnp.concatenate([slides, stops.strength])[joint].T,
         jnp.concatenate([slides, jnp.where(held, stops.reference, 0.0)])[joint].T,
+        pushing.strength[pair].T,
+        jnp.where(pushing.strength > 0, pushing.reference, 0.0)[pair].T,
         solution.qacc[joint].T,
     )
 

@@ -118,6 +118,37 @@ MIXTURE = """
   </worldbody>
 </mujoco>"""
 
+# A chain that folds onto itself, and a branch: what touches is of both, with margins, mixtures, and two capsules on
+# one body; steps of Runge and Kutta.
+TANGLE = f"""
+<mujoco>
+  <option integrator="RK4" timestep="0.004"/>
+  <default>
+    <geom type="capsule" size="0.05" contype="1" conaffinity="1" condim="1" margin="0.01" gap="0.02"/>
+    <joint type="hinge" axis="0 1 0" damping="0.1"/>
+  </default>
+  <worldbody>
+    <geom name="floor" type="plane" size="9 9 1" condim="3" margin="0.005"/>
+    <body name="one" pos="0 0 0.5">{_ROOT}
+      <geom name="one" fromto="0 0 0 0.2 0 0"/>
+      <geom name="stub" fromto="0.1 0 0 0.1 0 0.1" size="0.02" solref="0.03 0.8"/>
+      <body name="two" pos="0.2 0 0"><joint name="two"/>
+        <geom name="two" fromto="0 0 0 0.15 0 0.05" size="0.04"/>
+        <body name="three" pos="0.15 0 0.05"><joint name="three" limited="true" range="-140 140"/>
+          <geom name="three" fromto="0 0 0 0.2 0 0" solmix="3" solimp="0.5 0.95 0.02 0.3 3"/>
+          <body name="four" pos="0.2 0 0"><joint name="four" armature="0.01"/>
+            <geom name="four" fromto="0 0 0 0.1 0 -0.1" solmix="2"/>
+          </body>
+        </body>
+      </body>
+      <body name="branch" pos="0 0 0.1"><joint name="branch" axis="0 -1 0"/>
+        <geom name="branch" fromto="0 0 0 0.25 0 0.1" size="0.03"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="three" gear="3"/></actuator>
+</mujoco>"""
+
 # Nothing can touch the ground.
 PENDULUM = """
 <mujoco>

@@ -33,7 +33,7 @@ def both(visited):
     return planar_stages(MODEL, states_of(visited)), stages(MODEL, states_of(visited))
 
 
-@pytest.mark.parametrize("stage", Stages._fields)
+@pytest.mark.parametrize("stage", [each for each in Stages._fields if not each.startswith("mutual")])
 def test_every_stage_is_mujocos(stage, both):
     ours, theirs = (getattr(each, stage) for each in both)
     assert np.count_nonzero(theirs) > 500

@@ -12,7 +12,7 @@ from envs.planar import PlanarPhysics
 from envs.planar.physics import BLOCK
 from tests.envs.mujoco_reference import from_xml
 from tests.envs.planar_stages import QUICK_TO_COMPILE
-from tests.envs.small_models import FLAIL, PENDULUM, states_near_the_ground
+from tests.envs.small_models import FLAIL, PENDULUM, TANGLE, states_near_the_ground
 
 MODEL = from_xml(FLAIL)
 PHYSICS = PlanarPhysics(MODEL)
@@ -87,6 +87,26 @@ def test_two_devices_are_one(states, alone):
     axis = PartitionSpec("device")
     mesh = Mesh(jax.devices()[:2], ("device",))
     assert_same(compiled(jax.shard_map(jax.vmap(advance), mesh=mesh, in_specs=axis, out_specs=axis))(*states), alone)
+
+
+def test_bodies_that_touch_each_other_do_so_on_each_device_and_in_each_place():
+    """Where some states of a batch have pairs that touch, and others have none."""
+    model = from_xml(TANGLE)
+    states = states_near_the_ground(model, COUNT, seed=1)
+    physics = PlanarPhysics(model)
+
+    def advance(qpos, qvel, control):
+        state, displacement = physics.advance(BodyState(qpos, qvel), control, SUBSTEPS)
+        return state.qpos, state.qvel, displacement
+
+    together, alone = compiled(jax.vmap(advance)), compiled(advance)
+    each = [alone(*row) for row in zip(*states, strict=True)]
+    expected = tuple(np.stack(column) for column in zip(*each, strict=True))
+    assert_same(together(*states), expected)
+    mesh, axis = Mesh(jax.devices()[:2], ("device",)), PartitionSpec("device")
+    spread = compiled(jax.shard_map(jax.vmap(advance), mesh=mesh, in_specs=axis, out_specs=axis))
+    assert_same(spread(*states), expected)
+    np.testing.assert_allclose(expected[2], expected[0] - states.qpos, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("size", [BLOCK + 1, 2 * BLOCK + 5])

@@ -10,7 +10,7 @@ from envs.planar import PlanarPhysics, UnsupportedModel, solver
 from envs.planar.model import compile_model
 from tests.envs.mujoco_reference import States, from_xml
 from tests.envs.planar_stages import QUICK_TO_COMPILE, assert_agrees, forwarded, relative_difference
-from tests.envs.small_models import FLAIL, MIXTURE, PENDULUM, ROD, TREE, states_near_the_ground
+from tests.envs.small_models import FLAIL, MIXTURE, PENDULUM, ROD, TANGLE, TREE, states_near_the_ground
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,32 @@ def test_every_stage_is_mujocos(text, touching, at_limits):
     expected = assert_agrees(model, states_near_the_ground(model, 500, seed=0), tolerance=1e-9)
     assert (expected.contact_strength > 0).any((1, 2)).mean() >= touching
     assert (expected.limit_strength > 0).any(1).mean() >= at_limits
+
+
+@pytest.mark.parametrize("option", ['integrator="RK4"', 'integrator="Euler"'])
+def test_bodies_touch_each_other_as_mujocos(option):
+    """Up to four pairs at once."""
+    model = from_xml(TANGLE.replace('integrator="RK4"', option))
+    expected = assert_agrees(model, states_near_the_ground(model, 500, seed=0), tolerance=1e-9)
+    pairs = (expected.mutual_strength > 0).sum(1)
+    assert (pairs > 0).mean() > 0.3 and pairs.max() >= 4
+    assert ((pairs > 0) & (expected.contact_strength > 0).any((1, 2))).mean() > 0.05
+
+
+def test_steps_of_runge_and_kutta_are_mujocos():
+    """Damping is not implicit in them, and margins make no difference to where a contact is."""
+    margins = (
+        '<option integrator="RK4" ',
+        'conaffinity="0" margin="0.03" gap="0.1"/>',
+        '<geom name="floor" margin="0.02" ',
+    )
+    text = TREE
+    for old, new in zip(("<option ", 'conaffinity="0"/>', '<geom name="floor" '), margins, strict=True):
+        assert old in text
+        text = text.replace(old, new, 1)
+    model = from_xml(text)
+    expected = assert_agrees(model, states_near_the_ground(model, 500, seed=4), tolerance=1e-9)
+    assert (expected.contact_distance > 0).any((1, 2)).mean() > 0.01
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +106,7 @@ HEAD, FLOOR, BODY = '<geom name="head"', '<geom name="floor" type="plane"', '<bo
 
 # What is said of the flail after a text in it is replaced by another.
 REFUSED = [
-    ("integrator mjINT_RK4", BEGIN, BEGIN + '<option integrator="RK4"/>'),
+    ("integrator mjINT_IMPLICIT", BEGIN, BEGIN + '<option integrator="implicit"/>'),
     ("elliptic friction cone", BEGIN, BEGIN + '<option cone="elliptic"/>'),
     ("gravity that is not along z", BEGIN, BEGIN + '<option gravity="1 0 -9.81"/>'),
     ("medium with density or viscosity", BEGIN, BEGIN + '<option density="1.2"/>'),
@@ -124,12 +150,10 @@ REFUSED = [
     ("geom 'head': solref in direct form", HEAD, HEAD + ' solref="-100 -1"'),
     ("geom 'head': condim is not 3", HEAD, HEAD + ' condim="4"'),
     ("geom 'head': condim is not 3", HEAD, HEAD + ' condim="1" priority="1"'),
-    ("geom 'head': a contact margin", HEAD, HEAD + ' margin="0.01"'),
-    ("geom 'head': a contact gap", HEAD, HEAD + ' gap="0.01"'),
     ("geom 'ball': not a capsule, and touches the ground", HEAD, '<geom name="ball" type="sphere"/>' + HEAD),
     ("geom 'head': out of the plane", "0.3 0 0.1", "0.3 0.1 0.1"),
     (
-        "geom 'wall' and geom 'handle': geoms that touch",
+        "geom 'wall' and geom 'handle': touch each other, and one of them is of the world",
         FLOOR,
         '<geom name="wall" size="1 1" contype="0" conaffinity="1"/>' + FLOOR,
     ),
@@ -153,19 +177,30 @@ def test_what_it_cannot_represent_is_refused_by_name(reason, old, new):
     assert any(reason in problem for problem in error.problems), error.problems
 
 
-def test_bodies_that_touch_each_other_are_refused():
+@pytest.mark.parametrize(
+    ("reason", "geom"),
+    [
+        ("condim is not 1", 'type="capsule" fromto="0 0 0 -0.3 0 0" condim="3"'),
+        ("condim is not 1", 'type="capsule" fromto="0 0 0 -0.3 0 0" condim="4" priority="1"'),
+        ("not both are capsules", 'type="sphere" size="0.1" contype="0"'),
+        ("not in one plane", 'type="capsule" fromto="0 0.1 0 -0.3 0.1 0" condim="1"'),
+        ("not in one plane", 'type="capsule" fromto="0 0 0 -0.3 0.1 0" condim="1" contype="0"'),
+        ("solref is in direct form", 'type="capsule" fromto="0 0 0 -0.3 0 0" condim="1" contype="0" solref="-100 -1"'),
+    ],
+)
+def test_bodies_that_touch_each_other_in_other_ways_are_refused(reason, geom):
     """A head that can touch what hangs on the other end of the handle."""
-    tail = '<body name="tail"><joint axis="0 1 0"/><geom name="tail" fromto="0 0 0 -0.3 0 0" conaffinity="1"/></body>'
-    error = refusal((BODY, tail + BODY))
-    assert error.problems == ["geom 'tail' and geom 'head': geoms that touch each other"]
+    tail = f'<body name="tail"><joint axis="0 1 0"/><geom name="tail" {geom} conaffinity="1"/></body>'
+    error = refusal((BODY, tail + BODY), ('conaffinity="0"/>', 'conaffinity="0" condim="1"/>'))
+    assert f"geom 'tail' and geom 'head': touch each other, and {reason}" in error.problems
 
 
 def test_every_problem_is_named_at_once():
     error = refusal(
-        (BEGIN, BEGIN + '<option integrator="RK4" cone="elliptic"/>'), (JOINT, JOINT + ' frictionloss="0.1"')
+        (BEGIN, BEGIN + '<option integrator="implicit" cone="elliptic"/>'), (JOINT, JOINT + ' frictionloss="0.1"')
     )
     assert len(error.problems) == 3
-    assert all(each in str(error) for each in ("RK4", "elliptic", "joint 'swing': dry friction"))
+    assert all(each in str(error) for each in ("IMPLICIT", "elliptic", "joint 'swing': dry friction"))
 
 
 def test_a_number_stands_for_a_missing_name():
