@@ -16,8 +16,10 @@ from envs.checks import NotAsDeclared, check_declaration, check_environment
 from envs.core import Environment, EpisodeState, Objective, Step, Transition
 from envs.failures import failure
 from envs.half_cheetah import HalfCheetah
+from envs.hopper import Hopper, Hopper2
 from envs.mountain_car import MountainCar
 from envs.names import did_you_mean, nearest
+from envs.walker2d import Walker2d
 
 __all__ = [
     "Environment",
@@ -165,5 +167,5 @@ def _parts(id: str) -> tuple[str, str, dict[str, str]]:
     return module, plain_id(id), {option: value for option, _, value in pairs}
 
 
-register(MountainCar.id, MountainCar)
-register(HalfCheetah.id, HalfCheetah)
+for _environment in (MountainCar, HalfCheetah, Walker2d, Hopper, Hopper2):
+    register(_environment.id, _environment)

@@ -3,38 +3,24 @@
 Gymnasium's HalfCheetah-v5 with MO-Gymnasium's vector reward. One task, and a choice of who computes its physics.
 """
 
-from __future__ import annotations
-
-import importlib.util
-from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from envs.core import Environment, Objective, Transition
-from envs.drawing import Capsule, Part, Scene, Window, level_ground
-from envs.mujoco_model import load_model, planar_capsules
-from envs.physics import BodyState, Physics
-
-if TYPE_CHECKING:
-    import mujoco
+from envs.core import Objective, Transition
+from envs.drawing import Part
+from envs.physics import BodyState
+from envs.runner import Runner
 
 FRAME_SKIP = 5
 TIMESTEP = 0.01  # seconds, of the model
 JOINTS = 9  # three of the torso, then three of each leg
 RESET_NOISE = 0.1
-VIEW = 1.6  # metres to see on both sides of the torso
-PHYSICS = ("planar", "mjx")
 
 
-class HalfCheetah(Environment[BodyState]):
-    """A two-legged runner in the vertical plane. Reward: forward speed; minus the sum of the squared controls.
-
-    `physics` is "planar" (`envs.planar`: fast) or "mjx" (MuJoCo's own, slow on a CPU). Making one is cheap: the model
-    is loaded when it is first needed.
-    """
+class HalfCheetah(Runner):
+    """A two-legged runner in the vertical plane. Reward: forward speed; minus the sum of the squared controls."""
 
     id = "mo-halfcheetah-v5"
     objectives: ClassVar = (
@@ -45,30 +31,9 @@ class HalfCheetah(Environment[BodyState]):
     action_size = 6
     time_limit = 1000
     step_seconds = FRAME_SKIP * TIMESTEP
-
-    def __init__(self, physics: str = "planar"):
-        if physics not in PHYSICS:
-            raise ValueError(f"physics must be {' or '.join(PHYSICS)}, not {physics!r}")
-        if physics == "mjx" and importlib.util.find_spec("mujoco.mjx") is None:
-            raise ValueError("physics=mjx needs MJX: pip install 'jmorl[mjx]'")
-        self._backend = physics
-
-    @cached_property
-    def model(self) -> mujoco.MjModel:
-        """Gymnasium's model, as MuJoCo compiles it."""
-        return load_model("half_cheetah")
-
-    @cached_property
-    def physics(self) -> Physics:
-        """Who computes the dynamics."""
-        with jax.ensure_compile_time_eval():  # the first use may be under a trace, which its arrays must outlive
-            if self._backend == "mjx":
-                from envs.mjx import MjxPhysics
-
-                return MjxPhysics(self.model)
-            from envs.planar import PlanarPhysics
-
-            return PlanarPhysics(self.model)
+    model_name = "half_cheetah"
+    frame_skip = FRAME_SKIP
+    view = (1.6, 0.22, 1.3)
 
     def initial_state(self, key: jax.Array) -> BodyState:
         """Return a state drawn from the start distribution."""
@@ -83,26 +48,11 @@ class HalfCheetah(Environment[BodyState]):
 
     def transition(self, state: BodyState, action: jax.Array) -> Transition:
         """Apply the dynamics to a state and an action [A]."""
-        control = jnp.clip(action, -1.0, 1.0)
-        state, displacement = self.physics.advance(state, control, FRAME_SKIP)
-        # Not from a difference of positions, which in float32 and 10 km away is wrong by 0.01 m/s and more.
-        speed = displacement[0] / self.step_seconds
+        state, speed, control = self.moved(state, action)
         return Transition(state, jnp.stack([speed, -jnp.sum(control**2)]), jnp.array(False))
 
-    def scene(self, state: BodyState) -> Scene:
-        """Return the runner and the ground around it."""
-        qpos = np.asarray(state.qpos, np.float64)
-        window = Window((qpos[0] - VIEW, qpos[0] + VIEW), (-0.22, 1.3))
-        capsules = planar_capsules(self.model, qpos)
-        shapes = (
-            Capsule(tuple(each.start.tolist()), tuple(each.end.tolist()), each.radius, _part(each.name))
-            for each in capsules
-        )
-        return Scene((*level_ground(window), *shapes), window)
-
-
-def _part(geom: str) -> Part:
-    """Which of the three parts a capsule of the model belongs to, by its name."""
-    if geom in ("torso", "head"):
-        return "body"
-    return "hind" if geom.startswith("b") else "fore"
+    def part(self, geom: str) -> Part:
+        """Return which part of the runner a capsule of the model belongs to, by its name."""
+        if geom in ("torso", "head"):
+            return "body"
+        return "hind" if geom.startswith("b") else "fore"

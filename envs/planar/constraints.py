@@ -1,8 +1,8 @@
-"""Soft contacts with the ground and joint limits, as MuJoCo's documentation of the constraint model has them.
+"""Soft contacts and joint limits, as MuJoCo's documentation of the constraint model has them.
 
 A constraint row acts while its residual, acceleration less reference acceleration, is negative. A capsule end on the
-ground has four edges of a friction pyramid, `n + mu t`, `n - mu t` and, as nothing moves along y, `n` twice; a joint at
-a limit has one row.
+ground has four edges of a friction pyramid, `n + mu t`, `n - mu t` and, as nothing moves along y, `n` twice; two capsules
+that touch each other have one row, without friction, and so has a joint at a limit.
 """
 
 from typing import NamedTuple

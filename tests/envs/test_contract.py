@@ -1,6 +1,7 @@
 """What every registered environment promises."""
 
 import json
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +23,7 @@ def random_actions(environment, key, count):
     return 1.5 * jax.random.uniform(key, (count, environment.action_size), minval=-1.0)  # beyond the limits, too
 
 
+@partial(jax.jit, static_argnames=("environment", "steps"))  # once for all tests
 def random_episode(environment, key, steps=STEPS):
     reset_key, action_key, step_key = jax.random.split(key, 3)
     start = environment.reset(reset_key)
@@ -85,12 +87,14 @@ def test_truncates_exactly_at_the_time_limit(environment):
 
 
 def test_an_ending_resets_in_the_same_step_and_keeps_the_final_observation(environment):
-    state, first = environment.reset(jax.random.key(6))
+    state, _ = environment.reset(jax.random.key(6))
     ending = state.replace(elapsed_steps=jnp.array(environment.time_limit - 1, jnp.int32))
     action = jnp.full(environment.action_size, 0.5)
-    _, continued = environment.advance(state, action)
-    fresh, fresh_observation = environment.reset(jax.random.key(7))
-    after, step = environment.step(jax.random.key(7), ending, action)
+
+    def ways(key, state, ending):
+        return environment.advance(state, action), environment.reset(key), environment.step(key, ending, action)
+
+    (_, continued), (fresh, fresh_observation), (after, step) = jax.jit(ways)(jax.random.key(7), state, ending)
     np.testing.assert_array_equal(step.observation, fresh_observation)
     np.testing.assert_array_equal(step.final_observation, continued.final_observation)
     assert not np.array_equal(step.final_observation, step.observation)
@@ -110,8 +114,9 @@ def test_no_step_crosses_an_episode(environment):
 def test_actions_are_clipped(environment):
     state, _ = environment.reset(jax.random.key(9))
     limit = jnp.full(environment.action_size, environment.action_high)
-    _, at_limit = environment.advance(state, limit)
-    _, beyond = environment.advance(state, 3 * limit)
+    advance = jax.jit(environment.advance)
+    _, at_limit = advance(state, limit)
+    _, beyond = advance(state, 3 * limit)
     for left, right in zip(at_limit, beyond, strict=True):
         np.testing.assert_array_equal(left, right)
 
