@@ -1,7 +1,7 @@
 """Soft contacts and joint limits, as MuJoCo's documentation of the constraint model has them.
 
 A constraint row acts while its residual, acceleration less reference acceleration, is negative. A capsule end on the
-ground has four edges of a friction pyramid, `n + mu t`, `n - mu t` and, as nothing moves along y, `n` twice; two capsules
+ground has four edges of a friction pyramid, `n + mu t`, `n - mu t` and, as nothing moves along y, `n` twice; capsules
 that touch each other have one row, without friction, and so has a joint at a limit.
 """
 
