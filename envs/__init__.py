@@ -19,6 +19,7 @@ from envs.half_cheetah import HalfCheetah
 from envs.hopper import Hopper, Hopper2
 from envs.mountain_car import MountainCar
 from envs.names import did_you_mean, nearest
+from envs.pgmorl import PgmorlHalfCheetah, PgmorlHopper, PgmorlHopper3, PgmorlWalker2d
 from envs.walker2d import Walker2d
 
 __all__ = [
@@ -167,5 +168,8 @@ def _parts(id: str) -> tuple[str, str, dict[str, str]]:
     return module, plain_id(id), {option: value for option, _, value in pairs}
 
 
-for _environment in (MountainCar, HalfCheetah, Walker2d, Hopper, Hopper2):
+for _environment in (
+    *(MountainCar, HalfCheetah, Walker2d, Hopper, Hopper2),
+    *(PgmorlHalfCheetah, PgmorlWalker2d, PgmorlHopper, PgmorlHopper3),
+):
     register(_environment.id, _environment)

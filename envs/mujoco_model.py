@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import resources
 from typing import TYPE_CHECKING, NamedTuple
@@ -35,13 +36,17 @@ def quiet_mujoco() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-def load_model(name: str) -> mujoco.MjModel:
-    """Return the model `envs/assets/NAME.xml`, compiled by MuJoCo."""
+def load_model(name: str, change: Callable[[mujoco.MjSpec], None] | None = None) -> mujoco.MjModel:
+    """Return the model `envs/assets/NAME.xml`, with what is changed in it, compiled by MuJoCo."""
     import mujoco
 
     text = resources.files("envs").joinpath("assets", f"{name}.xml").read_text(encoding="utf-8")
-    with quiet_mujoco():  # Gymnasium's files have attributes that MuJoCo 4 calls deprecated
-        return mujoco.MjModel.from_xml_string(text)
+    with quiet_mujoco(), warnings.catch_warnings():  # Gymnasium's files have attributes that MuJoCo 4 calls deprecated
+        warnings.simplefilter("ignore")
+        specification = mujoco.MjSpec.from_string(text)
+        if change:
+            change(specification)
+        return specification.compile()
 
 
 def planar_capsules(model: mujoco.MjModel, qpos: np.ndarray) -> list[PlanarCapsule]:

@@ -24,7 +24,7 @@ FASTEST_SEEN = 10.0  # m/s or rad/s
 
 
 class Runner(Environment[BodyState]):
-    """A runner whose joints begin with slides along x and z and a hinge about y. Controls are torques within -1 and 1.
+    """A runner whose joints begin with slides along x and z and a hinge about y. Controls drive the other joints.
 
     `physics` is "planar" (`envs.planar`: fast) or "mjx" (MuJoCo's own, slow on a CPU). Making one is cheap: the model
     is loaded when it is first needed.
@@ -46,7 +46,10 @@ class Runner(Environment[BodyState]):
     @cached_property
     def model(self) -> mujoco.MjModel:
         """The model, as MuJoCo compiles it."""
-        return load_model(self.model_name)
+        return load_model(self.model_name, self.change)
+
+    def change(self, model: mujoco.MjSpec) -> None:
+        """Change parameters of the model before it is compiled; here none."""
 
     @cached_property
     def physics(self) -> Physics:
@@ -63,7 +66,8 @@ class Runner(Environment[BodyState]):
     def moved(self, state: BodyState, action: jax.Array) -> tuple[BodyState, jax.Array, jax.Array]:
         """Apply an action [A] for a step. Returns the state, the speed along x in m/s, and the clipped control [A]."""
         assert self.step_seconds is not None
-        control = jnp.clip(action, -1.0, 1.0)
+        low, high = (jnp.asarray(bound, action.dtype) for bound in (self.action_low, self.action_high))
+        control = jnp.clip(action, low, high)
         state, displacement = self.physics.advance(state, control, self.frame_skip)
         # Not from a difference of positions, which in float32 and 10 km away is wrong by 0.01 m/s and more.
         return state, displacement[0] / self.step_seconds, control
@@ -82,6 +86,12 @@ class Runner(Environment[BodyState]):
     def part(self, geom: str) -> Part:
         """Return which part of the runner a capsule of the model belongs to, by its name."""
         raise NotImplementedError
+
+
+def at_rest(qpos: Sequence[float]) -> BodyState:
+    """Return the state at the positions `qpos` [nq] without velocity."""
+    positions = jnp.array(qpos)
+    return BodyState(positions, jnp.zeros_like(positions))
 
 
 def near_rest(key: jax.Array, qpos: Sequence[float], noise: float) -> BodyState:

@@ -51,12 +51,17 @@ class Walker2d(Runner):
     def transition(self, state: BodyState, action: jax.Array) -> Transition:
         """Apply the dynamics to a state and an action [A]."""
         state, speed, control = self.moved(state, action)
-        z, angle = state.qpos[1], state.qpos[2]
-        healthy = (z > LOWEST) & (z < HIGHEST) & (jnp.abs(angle) < STEEPEST)
-        return Transition(state, jnp.stack([speed, -jnp.sum(control**2)]) + healthy.astype(speed.dtype), ~healthy)
+        well = healthy(state)
+        return Transition(state, jnp.stack([speed, -jnp.sum(control**2)]) + well.astype(speed.dtype), ~well)
 
     def part(self, geom: str) -> Part:
         """Return which part of the walker a capsule of the model belongs to, by its name."""
         if geom == "torso_geom":
             return "body"
         return "fore" if "left" in geom else "hind"
+
+
+def healthy(state: BodyState) -> jax.Array:
+    """Return whether the torso is neither low, nor high, nor steep, [] bool."""
+    z, angle = state.qpos[1], state.qpos[2]
+    return (z > LOWEST) & (z < HIGHEST) & (jnp.abs(angle) < STEEPEST)

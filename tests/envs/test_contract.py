@@ -59,7 +59,7 @@ def test_same_key_same_episode_other_key_another(environment):
     first, again, other = (random_episode(environment, jax.random.key(seed)) for seed in (1, 1, 2))
     for left, right in zip(jax.tree.leaves(first), jax.tree.leaves(again), strict=True):
         np.testing.assert_array_equal(left, right)
-    assert not np.array_equal(first[0][1], other[0][1])
+    assert not np.array_equal(first[1][1].observation, other[1][1].observation)
 
 
 def test_vmap_equals_a_loop(environment):
