@@ -79,6 +79,7 @@ class Environment(ABC, Generic[PhysicsState]):
     """
 
     id: ClassVar[str]
+    family: ClassVar[str] = "your own"  # whose results may be compared with one another
     objectives: ClassVar[tuple[Objective, ...]]
     observation_size: ClassVar[int]
     action_size: ClassVar[int]

@@ -34,6 +34,7 @@ class MountainCar(Environment[CarState]):
     """A car too weak for the hill. Reward: -1 a step until the flag; minus the squared force."""
 
     id = "mo-mountaincarcontinuous-v0"
+    family = "MO-Gymnasium"
     objectives: ClassVar = (
         Objective("time", "time", "-steps", highest=0.0),
         Objective("fuel", "fuel", "-force²·steps", highest=0.0),

@@ -23,6 +23,7 @@ from envs.walker2d import Walker2d
 if TYPE_CHECKING:
     import mujoco
 
+FAMILY = "PGMORL's authors"
 STEPS = 500
 ALIVE = 1.0  # reward of a step in every objective, or part of it
 FASTEST = 4.0  # m/s that the half cheetah gets anything for
@@ -47,6 +48,7 @@ class PgmorlHalfCheetah(HalfCheetah):
     """
 
     id = "pgmorl-halfcheetah-v2"
+    family = FAMILY
     objectives: ClassVar = (Objective("speed", "speed", "(m/s + 1)·steps", highest=STEPS * (FASTEST + ALIVE)), _ENERGY)
     time_limit = STEPS
 
@@ -65,6 +67,7 @@ class PgmorlWalker2d(Walker2d):
     """Reward: forward speed, and one; five minus the sum of the squared controls. Ends as Gymnasium's does."""
 
     id = "pgmorl-walker2d-v2"
+    family = FAMILY
     objectives: ClassVar = (Objective("speed", "speed", "(m/s + 1)·steps"), _ENERGY)
     time_limit = STEPS
 
@@ -93,6 +96,7 @@ class PgmorlHopper(Hopper):
     """
 
     id = "pgmorl-hopper-v2"
+    family = FAMILY
     objectives: ClassVar[tuple[Objective, ...]] = (
         Objective("speed", "speed", "(1.5 m/s + 1 - 0.0002 control²)·steps"),
         Objective("height", "height", "(12 m + 1 - 0.0002 control²)·steps"),

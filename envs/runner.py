@@ -30,6 +30,7 @@ class Runner(Environment[BodyState]):
     is loaded when it is first needed.
     """
 
+    family = "MO-Gymnasium"
     model_name: ClassVar[str]  # of its file in `envs/assets`
     frame_skip: ClassVar[int]  # time steps of the model in a step of the environment
     view: ClassVar[

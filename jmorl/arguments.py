@@ -94,7 +94,9 @@ def parser() -> argparse.ArgumentParser:
     _add_paper(commands)
     _add_study(commands)
 
-    commands.add_parser("envs", help="list the environments")
+    listed = commands.add_parser("envs", help="list the environments")
+    listed.add_argument("env", nargs="*", metavar="ENV", help="ids, also of yours: MODULE:ID (default: all)")
+    listed.add_argument("--speed", action="store_true", help="measure how fast each is here (some 15 seconds each)")
     return whole
 
 

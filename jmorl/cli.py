@@ -25,11 +25,13 @@ from jmorl.signals import Interrupted, StopSignals
 from jmorl.storage.layout import Layout
 
 if TYPE_CHECKING:
+    from jmorl.display.console import PlainConsole
     from jmorl.storage.resume import Continued
     from jmorl.storage.stored_run import StoredRun
     from jmorl.studio.session import Session
 
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+AT_ONCE = 96  # environments, where their speed is measured: those of six agents on HalfCheetah
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -385,10 +387,35 @@ def _study(options: argparse.Namespace) -> None:
 
 
 def _envs(options: argparse.Namespace) -> None:
+    import envs
     from jmorl.display.console import PlainConsole
-    from jmorl.report.tables import environments_table
+    from jmorl.report.tables import environment_tables
 
-    PlainConsole().print(environments_table())
+    ids = options.env or envs.ids()
+    problems = []
+    for name in ids:
+        try:
+            envs.make(name)
+        except ValueError as error:
+            problems.append(str(error))
+    if problems:
+        raise ConfigError(problems)
+    console = PlainConsole()
+    speeds = dict(_speeds(ids, console)) if options.speed else {}
+    for table in environment_tables(ids, speeds):
+        console.print(table)
+
+
+def _speeds(ids: Sequence[str], console: "PlainConsole") -> Iterator[tuple[str, str]]:
+    """Measure environments, and say at once how long each took to compile."""
+    import envs
+    from envs.speed import measure_speed
+    from jmorl.display.text import short_count
+
+    for name in ids:
+        speed = measure_speed(envs.make(name), AT_ONCE)
+        console.print(f"{name}: {AT_ONCE} at once on one core, {speed.compile_seconds:.0f} s to compile")
+        yield name, short_count(speed.steps_per_second)
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {

@@ -156,6 +156,24 @@ def test_envs_lists_every_environment(capsys, monkeypatch):
     assert main(["envs"]) == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in envs.ids())
+    assert printed.index("MO-Gymnasium") < printed.index("mo-walker2d-v5") < printed.index("PGMORL's authors")
+    assert "steps/s" not in printed
+
+
+def test_envs_measures_those_that_are_asked_for(capsys):
+    name = "tests.registered:probe-three-ways"
+    assert main(["envs", name, "mo-mountaincarcontinuous-v0", "--speed"]) == 0
+    printed = capsys.readouterr().out
+    assert "mo-halfcheetah" not in printed and "your own" in printed
+    rows = [line.split() for line in printed.splitlines() if line.strip().startswith(("tests.", "mo-"))]
+    assert len(rows) == 4 and all(re.search(r"\d( [kM])?$", " ".join(row)) for row in rows[2:])
+    assert "96 at once on one core" in printed
+
+
+def test_envs_measures_nothing_where_one_is_unknown(capsys):
+    assert main(["envs", "mo-mountaincarcontinuous-v0", "mo-hoper-v5", "--speed"]) == 2
+    shown = capsys.readouterr()
+    assert not shown.out and "did you mean" in shown.err
 
 
 def test_a_run_is_not_overwritten_without_force(folder, capsys):

@@ -1,6 +1,6 @@
 """The tables that the commands print: a run folder, an evaluation, the environments."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -151,16 +151,20 @@ def _mean_and_errors(column: np.ndarray) -> list[str]:
     return [f"{column.mean():{fmt}}", *_texts(np.array([deviation, deviation / np.sqrt(len(column))]), ".3g")]
 
 
-def environments_table() -> PlainTable:
-    """One row for each environment: what it optimises, and its sizes."""
+def environment_tables(ids: Sequence[str], speeds: Mapping[str, str]) -> list[PlainTable]:
+    """One table for each family, with a row for each environment: what it optimises, its sizes, its speed if known."""
     texts = "\nenvironment", "\nobjectives"
-    table = PlainTable(*texts, "obser-\nvations", "\nactions", "time\nlimit", words=texts)
-    for name in envs.ids():
+    tables: dict[str, PlainTable] = {}
+    for name in ids:
         environment = envs.make(name)
+        if environment.family not in tables:
+            headings = *texts, "obser-\nvations", "\nactions", "time\nlimit", *(["\nsteps/s"] if speeds else [])
+            tables[environment.family] = PlainTable(*headings, title=environment.family, words=texts)
         objectives = "\n".join(map(objective_label, environment.objectives))
         sizes = environment.observation_size, environment.action_size, environment.time_limit
-        table.add_row(name, objectives, *map(str, sizes))
-    return table
+        speed = [speeds[name]] if speeds else []
+        tables[environment.family].add_row(name, objectives, *map(str, sizes), *speed)
+    return list(tables.values())
 
 
 def _texts(column: np.ndarray, text: str | Callable[[float], str]) -> list[str]:

@@ -8,7 +8,7 @@ import pytest
 import envs
 from jmorl.display.console import PlainConsole
 from jmorl.learning.rollout import EpisodeReturns
-from jmorl.report.tables import comparison_table, environments_table, evaluation_table, run_tables
+from jmorl.report.tables import comparison_table, environment_tables, evaluation_table, run_tables
 from jmorl.search.policy import values_of
 
 
@@ -153,7 +153,7 @@ def test_two_evaluations_side_by_side():
 
 
 def test_every_environment_is_listed():
-    text = printed([environments_table()], width=100)
+    text = printed(environment_tables(envs.ids(), {}), width=140)
     for name in envs.ids():
         environment = envs.make(name)
         [row] = [line for line in text.splitlines() if line.startswith(f"{name} ")]
