@@ -16,26 +16,34 @@ import numpy as np
 from jmorl.learning.population import Population
 from jmorl.scoring import raw_scores
 from jmorl.search.policy import Confirmation, Policy, values_of
-from jmorl.search.scaling import range_scale
+from jmorl.search.scaling import core_scale
 
 FINALISTS = 4  # times P: as many policies are confirmed before the last question, at most
 CONFIDENCE = 0.99  # that the error of a confirmed score covers the mean of all starts, in each objective
 
 
 def finalists(front: Sequence[Policy], choice: Policy | None, agents: int) -> list[Policy]:
-    """Return the policies of a front that the result is likely to be among: all of a few, else those near the choice.
+    """Return the policies of a front that the result is likely to be among: all of a few.
 
-    None where there are many, and no choice.
+    Of many half are those nearest the choice, and half are spread over the rest, each the one farthest from those so
+    far (Gonzalez 1985): the choice may have been a stand-in's, or somebody may think otherwise at the end. None where
+    there are many, and no choice.
     """
     most = FINALISTS * agents
     if len(front) <= most:
         return list(front)
     if choice is None:
         return []
-    scale = range_scale(values_of(front))
-    distances = np.linalg.norm(scale.apply(values_of(front)) - scale.apply(choice.values), axis=1)
-    nearest = set(np.argsort(distances, kind="stable")[:most].tolist())
-    return [policy for index, policy in enumerate(front) if index in nearest]
+    values = values_of(front)
+    scale = core_scale(values)
+    scaled = scale.apply(values)
+    order = np.argsort(np.linalg.norm(scaled - scale.apply(choice.values), axis=1), kind="stable")
+    taken = order[: most // 2].tolist()
+    while len(taken) < most:
+        distances = np.linalg.norm(scaled[:, None] - scaled[taken], axis=2).min(axis=1)
+        distances[taken] = -1.0
+        taken.append(int(distances.argmax()))
+    return [policy for index, policy in enumerate(front) if index in taken]
 
 
 def confirmed(

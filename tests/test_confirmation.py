@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -98,13 +99,19 @@ def test_scores_in_drifting_units_are_not_confirmed(config):
     assert list(run(paper))[-1].chosen.confirmation is None
 
 
-def test_few_are_all_finalists_and_of_many_those_near_the_choice(events):
-    front = list(events[-1].state.archive.members)
-    assert finalists(front, None, len(front)) == front
-    many = front * 40
-    assert finalists(many, None, 1) == []
-    near = finalists(many, front[0], 1)
-    assert len(near) == 4 and set(near) == {front[0]}
+def test_few_are_all_finalists_and_of_many_those_near_the_choice_and_some_of_everywhere(events):
+    some = events[-1].state.archive.members[0]
+
+    def at(x):
+        return replace(some, values=np.array([x, -x, 0.0]))
+
+    few = [at(x) for x in range(4)]
+    assert finalists(few, None, 1) == few
+    # One is far out, and would hide what lies between the others.
+    front = [at(x) for x in (0.0, 0.1, 0.2, 0.3, 4.0, 8.0, 8.1, 8.2, 8.3, -1e6)]
+    assert finalists(front, None, 1) == []
+    assert [policy.values[0] for policy in finalists(front, front[1], 1)] == [0.0, 0.1, 8.3, -1e6]
+    assert [policy.values[0] for policy in finalists(front[:-1], front[1], 1)] == [0.0, 0.1, 4.0, 8.3]
 
 
 def test_everything_that_a_run_leaves_has_both_scores(folder):

@@ -1,6 +1,7 @@
 """A preference model: what the answers so far say of a decision maker's utility.
 
-The posterior is over linear, Chebyshev and aspiration-point utilities of values that are scaled to the front's range.
+The posterior is over linear, Chebyshev and aspiration-point utilities of values that are scaled to the range of the
+front's core: beside a policy that is far out in an objective all others would look alike, and no answer would matter.
 An answer is likely under a utility as a softmax of the utilities of what was shown, with a share of answers at random;
 how sharp it is and how large the share are inferred, too (Bradley and Terry 1952; Plackett 1975 for rankings; Davidson
 1970 for no difference; Zintgraf et al. 2018). In each generation somebody may have changed their mind, so that what
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jmorl.search.scaling import Scale, range_scale
+from jmorl.search.scaling import Scale, core, core_scale
 
 PARTICLES, DRAWN = 512, 2048  # that are kept, and from which they are resampled
 MOVES, STEP = 16, 0.4  # of Metropolis-Hastings: how many, and their standard deviation
@@ -63,24 +64,26 @@ class PreferenceModel:
         limits: np.ndarray | None = None,
     ):
         self.front = front
-        self.scale = range_scale(front)
+        self.scale = core_scale(front)
+        self._core = front[core(front)]
         self._limits = np.full(front.shape[1], -np.inf) if limits is None else limits
         self._generator = np.random.default_rng(seed)
         self._kinds, self._parameters = _posterior(self.scale, front, answers, generation, self._generator)
 
     def utilities(self, values: np.ndarray) -> np.ndarray:
-        """Return what vectors [N, M] are worth to each particle [S, N]; the front's worst is 0, its best 1.
+        """Return what vectors [N, M] are worth to each particle [S, N]; the worst of the front's core is 0, its best 1.
 
-        One that does not reach the limits is worth less than 0, and the less, the more is missing.
+        What is far out is worth no less than -1: a few particles that have no use for it shall not outvote all others.
+        One that does not reach the limits is worth less than that, and the less, the more is missing.
         """
-        found, of_front = (
-            _utilities(self._kinds, self._parameters, self.scale.apply(each)) for each in (values, self.front)
+        found, of_core = (
+            _utilities(self._kinds, self._parameters, self.scale.apply(each)) for each in (values, self._core)
         )
-        least, span = _range(of_front)
+        least, span = _range(of_core)
         missing = np.maximum(self._limits - values, 0.0) / self.scale.span  # [N, M]
         far = missing.sum(axis=1)
-        scaled = (found - least[:, None]) / span[:, None]
-        return np.where(far > 0, WITHIN_LIMITS * scaled - 1 - far, scaled)
+        scaled = np.maximum((found - least[:, None]) / span[:, None], -1.0)
+        return np.where(far > 0, WITHIN_LIMITS * scaled - 2 - far, scaled)
 
     def verdict(self) -> Verdict:
         """Return which member of the front is best by expectation."""
@@ -125,7 +128,7 @@ def _posterior(
     """Return kinds [S] and parameters [S, M] of utilities drawn from the posterior."""
     kinds = generator.permutation(np.resize(KINDS, DRAWN))  # in no order, or resampling in equal steps would drop some
     parameters = _prior(generator, kinds, front.shape[1])
-    ends = scale.apply(front)
+    ends = scale.apply(front[core(front)])
     scaled = [(scale.apply(answer.shown), answer.ranking) for answer in answers]
     likelihoods = _log_likelihoods(kinds, parameters, scaled, ends)  # [A, B, S]
     changed = _changes_of_mind(generator, generation, len(kinds))  # [S]

@@ -7,11 +7,12 @@ import plotille
 from rich.text import Text
 
 from envs.core import Objective
-from jmorl.display.limits import around, core, inside
+from jmorl.display.limits import around, inside
 from jmorl.display.tables import PlainTable
 from jmorl.display.text import number_format, plural
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy, values_of
+from jmorl.search.scaling import core
 
 AXIS_COLUMNS = 19  # that plotille adds to the width of a plot, besides the label of the axis
 AXIS_LINES = 5  # and to its height, with a line about what is left out

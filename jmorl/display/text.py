@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.core import Objective
-from jmorl.display.limits import core
 from jmorl.search.policy import Policy
+from jmorl.search.scaling import core
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 REASONS = {  # why a run ended

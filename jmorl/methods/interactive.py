@@ -104,8 +104,12 @@ class Interactive(PGMORL):
         return self._bounded(run, state, run.choice) if in_silence else state
 
     def final_front(self, run: RunState) -> Sequence[Policy]:
-        """Return the members of the archive within the bounds; if some reach the limits, no others."""
-        inside = members_within(run.archive.members, run.search.bounds)
+        """Return the members of the archive within the bounds, and, if bounds give way, outside; within limits if any.
+
+        Who follows a stand-in, or changes their mind, sees at the end what lies elsewhere, too.
+        """
+        bounds = run.search.bounds if not self.problem.search.least_within else np.full_like(run.search.bounds, -np.inf)
+        inside = members_within(run.archive.members, bounds)
         if run.search.limits is None:
             return inside
         return members_within(inside, np.array(run.search.limits)) or inside

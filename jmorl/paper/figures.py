@@ -16,7 +16,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from envs import make
-from jmorl.display.limits import core
 from jmorl.display.text import objective_label
 from jmorl.experiments.targets import TargetRow
 from jmorl.paper.analysis import Finals
@@ -24,6 +23,7 @@ from jmorl.paper.by_default import BY_DEFAULT, StudyRuns, default_curves, defaul
 from jmorl.paper.plan import NAMES, SHORTER, Item, Plan
 from jmorl.paper.results import Curves, Records, curves, final_policies, target_rows
 from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, RED, legend_below, new_figure, style
+from jmorl.search.scaling import core
 from jmorl.storage.files import written_whole
 from jmorl.units import measured_in
 

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from jmorl.decision.records import DecisionRecord
-from jmorl.display.limits import around, core, hopeful, inside
+from jmorl.display.limits import around, hopeful, inside
 from jmorl.display.text import plural
 from jmorl.report.labels import place_labels
 from jmorl.report.style import (
@@ -30,6 +30,7 @@ from jmorl.report.style import (
 )
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import values_of
+from jmorl.search.scaling import core
 from jmorl.storage.stored_run import StoredRun
 
 BOUNDS_LINE: dict[str, Any] = {"color": BLUE, "alpha": 0.4, "linewidth": 0.9, "linestyle": (0, (4, 3))}

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
-from jmorl.display.limits import around, core, inside
+from jmorl.display.limits import around, inside
 from jmorl.display.text import objective_label, plural, short_count
 from jmorl.report.style import (
     BLUE,
@@ -25,6 +25,7 @@ from jmorl.report.style import (
     note,
 )
 from jmorl.search.prediction import COVERAGE
+from jmorl.search.scaling import core
 from jmorl.storage.stored_run import StoredRun
 
 BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}

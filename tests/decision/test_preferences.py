@@ -78,6 +78,24 @@ def test_units_do_not_matter_and_the_same_answers_give_the_same_posterior():
     )
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_beside_a_policy_far_out_the_others_do_not_look_alike(seed):
+    """A car that never moves uses no fuel, and needs ten times as long as any that arrives."""
+    angles = np.linspace(0.1, np.pi / 2 - 0.1, 12)
+    front = np.stack([-70 - 30 * (1 - np.cos(angles)), -25 - 30 * (1 - np.sin(angles))], axis=1)
+    still, asked = [-999.0, -0.3], front[[0, 4, 8, 11]]
+    without = PreferenceModel(front, [Comparison(asked, (1,))], seed).verdict()
+    beside = PreferenceModel(np.vstack([front, still]), [Comparison(np.vstack([asked, still]), (1,))], seed).verdict()
+    assert beside.best == without.best
+    assert beside.regret == pytest.approx(without.regret, rel=0.15) and without.regret > 0.05
+
+
+def test_whoever_wants_what_is_far_out_gets_it():
+    front = np.array([[-70.0, -55], [-75, -45], [-80, -38], [-85, -35], [-90, -33], [-100, -30], [-999, -0.3]])
+    answers = [Comparison(front, (6,)), Comparison(front[3:], (3,))]
+    assert PreferenceModel(front, answers, 0).verdict().best == 6
+
+
 def test_more_is_never_worth_less():
     first, second = fronts(np.random.default_rng(2), 2, 3)
     model = PreferenceModel(second, [Comparison(first, (4,))], 0)

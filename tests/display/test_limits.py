@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from jmorl.display.limits import around, core, hopeful, inside
+from jmorl.display.limits import around, hopeful, inside
+from jmorl.search.scaling import core
 
 VECTORS = arrays(float, st.tuples(st.integers(1, 12), st.integers(1, 3)), elements=st.floats(-100, 100))
 
@@ -33,6 +34,8 @@ def test_only_what_is_far_out_is_left_out():
 
 def test_equal_values_make_none_of_the_others_far_out():
     assert core(np.array([[1.0], [1], [1], [1], [1], [7]])).all()
+    far = np.repeat([[0.0, 1, 2, 3, 4, 5, 6, 7]], 8, axis=0).T + 1e6 * np.eye(8)  # each in an objective of its own
+    assert core(far).all()
 
 
 def test_hopeless_is_only_what_is_far_below():

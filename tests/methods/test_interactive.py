@@ -194,6 +194,16 @@ def test_the_last_question_shows_what_reaches_the_limits_if_anything_does(config
     assert shown(None) == shown((np.inf, 0.0, 0.0)) == shown((-np.inf,) * 3) == everything
 
 
+def test_the_last_question_leaves_out_what_lies_outside_the_bounds_only_where_they_never_give_way(config, events):
+    state = generations(events)[-1].state
+    bounds = np.array([float(np.median(state.archive.values[:, 0])), -np.inf, -np.inf])
+    state = replace(state, search=replace(state.search, bounds=bounds))
+    for least_within, kept in ((3, np.full(3, -np.inf)), (0, bounds)):
+        method: Any = make_method(config.replace(search={"least_within": least_within}), envs.make(config.env))
+        shown = [policy.id for policy in method.final_front(state)]
+        assert shown == [policy.id for policy in state.archive.members if within(policy.values[None], kept).all()]
+
+
 def test_the_last_question_of_a_run_keeps_to_the_limits(limited):
     state = generations(limited)[-1].state
     archived = {policy.id: policy.values for policy in state.archive.members}

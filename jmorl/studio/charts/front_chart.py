@@ -6,10 +6,11 @@ import numpy as np
 
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion
-from jmorl.display.limits import around, core, inside
+from jmorl.display.limits import around, inside
 from jmorl.display.text import plural
 from jmorl.methods.base import Prospect
 from jmorl.search.bounds import within
+from jmorl.search.scaling import core
 from jmorl.studio.charts.chart_style import (
     BLUE,
     GREEN,
