@@ -22,7 +22,7 @@ ENOUGH_WEIGHTS = 4  # tau and sigma double until the near records have this many
 
 COVERAGE = 0.8  # share of what comes that shall lie within a prediction's interval
 REMEMBERED = 36  # surprises, the last ones, that calibrate intervals
-ENOUGH = 24  # surprises that an interval needs no assumption beside
+ENOUGH = 12  # surprises that an interval needs no assumption beside
 PRIOR_RECORDS = 2  # that a candidate's spread counts as beside its own, with the usual change as their residual
 
 

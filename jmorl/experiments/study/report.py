@@ -63,8 +63,9 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
             "of the best: mean, a run that never has one counting as the budget, and how many have one."
         )
         yield _user_table(users)
-        yield "Utility gained against the other methods, as paired differences (clearly: the interval excludes 0):"
-        yield _gains(users, study.contenders_of(part))
+        if len(study.contenders_of(part)) > 1:
+            yield "Utility gained against the other methods, as paired differences (clearly: the interval excludes 0):"
+            yield _gains(users, study.contenders_of(part))
     if targets:
         yield tables.steps_used(targets)
         yield tables.seed_by_seed(targets)
