@@ -20,7 +20,8 @@ from jmorl.search.scaling import Scale, core, core_scale
 
 PARTICLES, DRAWN = 512, 2048  # that are kept, and from which they are resampled
 MOVES, STEP = 16, 0.4  # of Metropolis-Hastings: how many, and their standard deviation
-TEMPERATURES = (0.003, 0.01, 0.03, 0.1)  # of the softmax, in shares of the utility's range over the front
+# Of the softmax, in shares of the utility's range over the front's core.
+TEMPERATURES = np.array([0.003, 0.01, 0.03, 0.1], np.float32)
 RANDOM_SHARES = (0.02, 0.25)  # of answers
 CHANGE_OF_MIND = 0.01  # how likely it is in a generation
 AUGMENTATION = 0.05  # weight of the mean in utilities that look at the worst objective
@@ -128,9 +129,8 @@ def _posterior(
     """Return kinds [S] and parameters [S, M] of utilities drawn from the posterior."""
     kinds = generator.permutation(np.resize(KINDS, DRAWN))  # in no order, or resampling in equal steps would drop some
     parameters = _prior(generator, kinds, front.shape[1])
-    ends = scale.apply(front[core(front)])
-    scaled = [(scale.apply(answer.shown), answer.ranking) for answer in answers]
-    likelihoods = _log_likelihoods(kinds, parameters, scaled, ends)  # [A, B, S]
+    evidence = _evidence(scale, front, answers)
+    likelihoods = _log_likelihoods(kinds, parameters, evidence)  # [A, B, S]
     changed = _changes_of_mind(generator, generation, len(kinds))  # [S]
     counts = np.array([answer.generation for answer in answers])[:, None] >= changed  # [A, S]
     likelihood = _before_changes(likelihoods, counts) + _together(likelihoods, counts)
@@ -144,7 +144,7 @@ def _posterior(
     density = _together(likelihoods[:, :, drawn], counts) + _log_prior(kinds, parameters)
     for _ in range(MOVES):
         proposed = parameters + STEP * generator.normal(size=parameters.shape) * generator.random((PARTICLES, 1))
-        found = _together(_log_likelihoods(kinds, proposed, scaled, ends), counts) + _log_prior(kinds, proposed)
+        found = _together(_log_likelihoods(kinds, proposed, evidence), counts) + _log_prior(kinds, proposed)
         accepted = np.log(generator.random(PARTICLES)) < found - density
         parameters = np.where(accepted[:, None], proposed, parameters)
         density = np.where(accepted, found, density)
@@ -188,29 +188,48 @@ def _log_prior(kinds: np.ndarray, parameters: np.ndarray) -> np.ndarray:  # [S]
     return density
 
 
-def _log_likelihoods(
-    kinds: np.ndarray, parameters: np.ndarray, answers: Sequence[tuple[np.ndarray, tuple[int, ...]]], ends: np.ndarray
-) -> np.ndarray:  # [A, B, S]
+@dataclass(frozen=True, eq=False)
+class _Evidence:
+    """What was said of which vectors. Most were shown again and again; each is judged once."""
+
+    points: np.ndarray  # [P, M] distinct scaled vectors
+    core: np.ndarray  # [N] rows of the front's core
+    answers: tuple[tuple[np.ndarray, tuple[int, ...]], ...]  # A: rows [K] of what was shown, and the ranking
+
+
+def _evidence(scale: Scale, front: np.ndarray, answers: Sequence[Comparison]) -> _Evidence:
+    parts = [front[core(front)], *(answer.shown for answer in answers)]
+    points, rows = np.unique(np.concatenate(parts), axis=0, return_inverse=True)
+    of_core, *of_answers = np.split(rows.ravel(), np.cumsum([len(part) for part in parts])[:-1])
+    said = zip(of_answers, (answer.ranking for answer in answers), strict=True)
+    return _Evidence(scale.apply(points), of_core, tuple(said))
+
+
+def _log_likelihoods(kinds: np.ndarray, parameters: np.ndarray, evidence: _Evidence) -> np.ndarray:  # [A, B, S]
     """Return the likelihood of each answer, for each temperature and share of random answers."""
+    answers = evidence.answers
     found = np.zeros((len(answers), len(TEMPERATURES), len(RANDOM_SHARES), len(kinds)))
     shares = np.array(RANDOM_SHARES)[:, None]
-    _, span = _range(_utilities(kinds, parameters, ends))
+    of_all = _utilities(kinds, parameters, evidence.points)  # [S, P]
+    _, span = _range(of_all[:, evidence.core])
     for answer, (shown, ranking) in zip(found, answers, strict=True):
-        utilities = _utilities(kinds, parameters, shown)  # [S, K]
+        utilities = of_all[:, shown]  # [S, K]
         behind = (utilities.max(axis=1, keepdims=True) - utilities) / span[:, None]
-        for number, temperature in enumerate(TEMPERATURES):
-            left = np.ones(len(shown), bool)
-            for place in ranking[: len(shown) - 1]:
-                nearest = behind[:, left].min(axis=1, keepdims=True)  # or the odds of all that are left may vanish
-                odds = np.exp(np.maximum(behind - nearest, 0) / np.float32(-temperature))
-                probability = odds[:, place] / odds[:, left].sum(axis=1)
+        left = np.ones(len(shown), bool)
+        for place in ranking[: len(shown) - 1]:
+            remaining = behind if left.all() else behind[:, left]
+            nearest = remaining.min(axis=1, keepdims=True)  # or the odds of all that are left may vanish
+            others, own = remaining - nearest, behind[:, place] - nearest[:, 0]
+            for number, temperature in enumerate(TEMPERATURES):
+                probability = np.exp(own / -temperature) / np.exp(others / -temperature).sum(axis=1)
                 answer[number] += np.log((1 - shares) * probability + shares / left.sum())
-                left[place] = False
-            if not ranking:
-                alike = np.exp(-behind.mean(axis=1) / np.float32(temperature))  # geometric mean of the odds
-                odds = np.exp(behind / np.float32(-temperature))
-                probability = alike / (odds.mean(axis=1) + alike)
-                answer[number] += np.log((1 - shares) * probability + shares / (len(shown) + 1))
+            left[place] = False
+        if ranking:
+            continue
+        for number, temperature in enumerate(TEMPERATURES):
+            alike = np.exp(-behind.mean(axis=1) / temperature)  # geometric mean of the odds
+            probability = alike / (np.exp(behind / -temperature).mean(axis=1) + alike)
+            answer[number] += np.log((1 - shares) * probability + shares / (len(shown) + 1))
     return found.reshape(len(answers), len(TEMPERATURES) * len(RANDOM_SHARES), len(kinds))
 
 

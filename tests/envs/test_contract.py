@@ -10,11 +10,12 @@ import pytest
 
 import envs
 from envs.drawing import NoDrawing
+from tests.envs.every import EVERY
 
 STEPS = 60
 
 
-@pytest.fixture(params=envs.ids())
+@pytest.fixture(params=EVERY)
 def environment(request):
     return envs.make(request.param)
 
@@ -113,7 +114,7 @@ def test_no_step_crosses_an_episode(environment):
 
 def test_actions_are_clipped(environment):
     state, _ = environment.reset(jax.random.key(9))
-    limit = jnp.full(environment.action_size, environment.action_high)
+    limit = jnp.broadcast_to(jnp.asarray(environment.action_high), environment.action_size)
     advance = jax.jit(environment.advance)
     _, at_limit = advance(state, limit)
     _, beyond = advance(state, 3 * limit)

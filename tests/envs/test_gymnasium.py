@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import envs
 from envs.gymnasium import GymnasiumEnvironment
+from tests.envs.every import EVERY
 from tests.probes import UnevenBox
 
 
@@ -22,14 +23,15 @@ class Scalarized(gymnasium.RewardWrapper):
         return float(reward.sum())
 
 
-@pytest.mark.parametrize("name", envs.ids())
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.filterwarnings("ignore:.*is different from the unwrapped version:UserWarning")
 @pytest.mark.filterwarnings("ignore:.*Box observation space m.*is -?infinity:UserWarning")
+@pytest.mark.filterwarnings("ignore:.*we recommend using a symmetric and normalized space:UserWarning")
 def test_passes_gymnasiums_checker(name):
     check_env(Scalarized(GymnasiumEnvironment(envs.make(name))), skip_render_check=True)
 
 
-@pytest.mark.parametrize("name", envs.ids())
+@pytest.mark.parametrize("name", EVERY)
 def test_an_episode_is_the_environments_own(name):
     adapted, original = GymnasiumEnvironment(envs.make(name)), envs.make(name)
     observation, _ = adapted.reset(seed=3)
