@@ -33,9 +33,7 @@ class Runner(Environment[BodyState]):
     family = "MO-Gymnasium"
     model_name: ClassVar[str]  # of its file in `envs/assets`
     frame_skip: ClassVar[int]  # time steps of the model in a step of the environment
-    view: ClassVar[
-        tuple[float, float, float]
-    ]  # metres to see on both sides of the torso, below the ground and above it
+    view: ClassVar[tuple[float, float, float]]  # metres to see: beside the torso, below the ground, above it
 
     def __init__(self, physics: str = "planar"):
         if physics not in PHYSICS:

@@ -51,7 +51,7 @@ BASELINE: Mapping[str, Any] = {
     "search.bounds_scale": "range",
     "search.least_slack": 0.0,
     "search.least_within": 0,
-    "search.scout_share": 0.0,
+    "search.outside_share": 0.0,
     "search.optimism": 0.0,
     "search.gain_within": "bounds",
     "search.value_scale": "range",
@@ -71,7 +71,7 @@ ADDED_SINCE_FORMAT_1 = frozenset(
         "population.weights",
         "search.least_slack",
         "search.least_within",
-        "search.scout_share",
+        "search.outside_share",
         "search.optimism",
     }
 )

@@ -31,7 +31,7 @@ PAPER_RULE: Mapping[str, Any] = {
     "ask": "always",
     "question": "front",
     "evaluation": {"confirmation_episodes": 0},
-    "search": {"least_slack": 0.0, "least_within": 0, "scout_share": 0.0},
+    "search": {"least_slack": 0.0, "least_within": 0, "outside_share": 0.0},
 }
 
 _PAPER_CAR = {

@@ -58,7 +58,7 @@ OTHER = {
     "search.delta": 0.3,
     "search.least_slack": 0.05,
     "search.least_within": 4,
-    "search.scout_share": 0.5,
+    "search.outside_share": 0.5,
     "search.optimism": 0.5,
     "search.bounds_scale": "one",
     "search.gain_within": "front",

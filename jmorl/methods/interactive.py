@@ -62,7 +62,7 @@ class Interactive(PGMORL):
         """Return the scouts that the next generation trains. Once underway they go on, also if the choice moves."""
         if not search.scouts.underway and search.generations_with_choice < PATIENCE:
             return ()
-        return search.scouts.trained_now(round(self.problem.search.scout_share * self.problem.agents))
+        return search.scouts.trained_now(round(self.problem.search.outside_share * self.problem.agents))
 
     def answered(self, run: RunState, question: AnyQuestion, answer: Any) -> PGMORLState:
         """Return the state with the bounds that follow from the choice."""

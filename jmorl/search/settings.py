@@ -23,7 +23,7 @@ class SearchConfig(Section):
         3,
         description="interactive: widen the bounds until so many of the buffer lie within; 0: never (the paper)",
     )
-    scout_share: Annotated[float, Field(ge=0, le=1)] = Field(
+    outside_share: Annotated[float, Field(ge=0, le=1)] = Field(
         0.17,
         description="interactive: share of the tasks that train scouts while the choice stays; 0: none (the paper)",
     )

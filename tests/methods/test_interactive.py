@@ -15,7 +15,7 @@ from jmorl.search.policy import values_of
 from jmorl.search.scouts import ENDURANCE, Scouts
 from tests.resuming import Counting, go_on, outcome, train
 
-WIDE = {"delta": 1e-3, "least_within": 3, "least_slack": 0.01, "scout_share": 0.5}
+WIDE = {"delta": 1e-3, "least_within": 3, "least_slack": 0.01, "outside_share": 0.5}
 
 
 @pytest.fixture(scope="module")
