@@ -41,11 +41,8 @@ from jmorl.decision.utility import (
 )
 from jmorl.display.characters import to_path
 
-KNOWN = (
-    f"{', '.join(USERS)}, weights=W1,W2,...[,chebyshev[=Z1,Z2,...]], target=Z1,Z2,...[,unscaled], terminal, script=FILE"
-)
 OPTIONS = {  # of users with weights, and how they are written
-    "chebyshev": "chebyshev=Z1,Z2,...",
+    "chebyshev": "chebyshev[=Z1,Z2,...]",
     "concave": "concave=WORST1,WORST2,...,BEST1,BEST2,...",
     "random": "random=SHARE",
     "temperature": "temperature=T",
@@ -53,6 +50,10 @@ OPTIONS = {  # of users with weights, and how they are written
     "until": "until=GENERATION",
     "limits": "limits=Z1,none,...",
 }
+KNOWN = (
+    f"{', '.join(USERS)} or weights=W1,W2,..., each with options ({', '.join(OPTIONS.values())}); "
+    "target=Z1,Z2,...[,unscaled]; terminal; script=FILE"
+)
 
 
 def make_user(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:

@@ -204,7 +204,7 @@ def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
         return f"{answer} ({plural(len(question.shown), 'policy')} shown)"
     formats = [number_format(column) for column in question.values.T]
     values = values_in_words(chosen.values, objectives, formats)
-    choice = f"policy {chosen.id} ({values}) of {len(question.shown)} shown"
+    choice = f"policy {chosen.id} ({values}) of {len(question.shown)} shown{_more_of_answer(decided)}"
     if question.stops(decided.answer):
         return f"{choice}, and stop"
     if question.purpose == "final":
@@ -213,6 +213,14 @@ def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
     silent = decided.generations_to_question or 0
     more = f", no question for {plural(silent, 'generation')}" if silent > 1 else ""
     return f"{choice}; bounds {bounds}{more}"
+
+
+def _more_of_answer(decided: Decided) -> str:
+    """Say what an answer tells beside the policy: an order of several, or that none is better than the others."""
+    ranking, equal = getattr(decided.answer, "ranking", ()), getattr(decided.answer, "equal", False)
+    if equal:
+        return ", no difference between them"
+    return f", in the order {', '.join(map(str, ranking))}" if ranking else ""
 
 
 def show_result(console: PlainConsole, event: RunFinished, objectives: tuple[Objective, ...]) -> None:

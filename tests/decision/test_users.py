@@ -105,7 +105,7 @@ def test_without_a_known_number_of_objectives_any_number_passes(spec):
 @pytest.mark.parametrize(
     ("spec", "objectives", "problem"),
     [
-        ("D", 2, "unknown user 'D'; known: A, B, C, weights=.*, target=.*, terminal, script=FILE"),
+        ("D", 2, "unknown user 'D'; known: A, B, C or weights=W1.*random=SHARE.*; target=.*; terminal; script=FILE"),
         ("", 2, "unknown user ''"),
         ("a", 2, "unknown user 'a'"),
         ("A=1", 2, "unknown user 'A=1'"),

@@ -62,6 +62,10 @@ def test_a_choice_is_said_with_values_and_bounds(make_events):
     words = "policy 2 (time -201, fuel -91.29) of 4 shown"
     bounds = f"bounds time ≥ {time:.0f}, fuel ≥ {fuel:.2f}"
     assert f"choice for generation 1: {words}; {bounds}\n" in shown("lines", [decided])
+    ranked = replace(decided, answer=replace(decided.answer, ranking=(2, 3, 0)))
+    assert f"{words}, in the order 2, 3, 0; {bounds}\n" in shown("lines", [ranked])
+    same = replace(decided, answer=replace(decided.answer, equal=True))
+    assert f"{words}, no difference between them; {bounds}\n" in shown("lines", [same])
     for_long = replace(decided, generations_to_question=3)
     assert f"{words}; {bounds}, no question for 3 generations\n" in shown("lines", [for_long])
     enough = replace(decided, answer=replace(decided.answer, stop=True))
