@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 DEMO_OUT ?= runs/demo
 INSTALLED := $(VENV)/.installed
 BROWSER := $(VENV)/.browser
+PLAYGROUND := $(VENV)/.playground
 
 .PHONY: demo studio test test-slow test-studio screenshots check format bench bench-demo bench-physics bench-checkpoints \
 	bench-selection bench-studio quality paper clean
@@ -19,7 +20,7 @@ studio: $(INSTALLED)  ## steer a run on MountainCar yourself, on a web page; the
 test: $(INSTALLED)  ## the test suite (a few minutes), the files spread over the cores
 	$(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
 
-test-slow: $(INSTALLED)  ## the tests that take minutes each: physics, interrupted runs, learning
+test-slow: $(PLAYGROUND)  ## the tests that take minutes each: physics, interrupted runs, learning
 	$(BIN)/python -m pytest -m slow
 
 test-studio: $(BROWSER)  ## the studio in a real browser, against real training runs (minutes)
@@ -64,11 +65,15 @@ paper: $(INSTALLED)  ## the paper's experiments in its units and in raw ones: ho
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium,mjx,studio,video]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev,gymnasium,studio,video]'
 	touch $@
 
 $(BROWSER): $(INSTALLED) /usr/bin/chromium
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[browser-tests]'
+	touch $@
+
+$(PLAYGROUND): $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[playground]'
 	touch $@
 
 /usr/bin/chromium:

@@ -2,13 +2,16 @@
 
 `envs.make(id)` gives one, `envs.ids()` lists them, `envs.register` adds yours; `envs.make("module:id")` imports the
 module that does so. An id may carry options of its environment: `envs.make("mo-halfcheetah-v5,physics=mjx")`.
+`brax:NAME` and `playground:NAME` are environments of those libraries (`envs.brax`, `envs.playground`).
 """
 
 import importlib
+import importlib.util
 import inspect
 import re
 import sys
 from collections.abc import Callable, Hashable
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +41,7 @@ __all__ = [
 ]
 
 ID = re.compile(r"[^\s,:]+")
+LIBRARIES = {"brax": "brax", "playground": "mujoco_playground"}  # whose environments can be made, and their packages
 registry: dict[str, Callable[..., Environment[Any]]] = {}  # what `register` fills: factories by id
 _made: dict[
     Hashable, Environment[Any]
@@ -67,18 +71,35 @@ def make(id: str, **options: Any) -> Environment[Any]:
     what is known, for a module, an id or an option that there is none of, for a value that the environment refuses,
     for a module or an environment that breaks down, and NotAsDeclared for one that declares what cannot be.
     """
+    name, factory, written = _found(id)
+    options = written | options
+    _check_options(name, factory, options)
+    key = (name, factory, *sorted(options.items()))
+    if key not in _made:
+        _made[key] = _new(name, factory, options)
+    return _made[key]
+
+
+def _found(id: str) -> tuple[str, Callable[..., Environment[Any]], dict[str, str]]:
+    """Return name, factory and options of what an id stands for. Raises ValueError."""
     module, name, written = _parts(id)
+    if module in LIBRARIES:
+        return f"{module}:{name}", _of_library(module, name), written
     if module:
         _import(id, module)
     if name not in registry:
         known = f"known: {', '.join(ids())}{did_you_mean(nearest(name, ids()))}"
         raise ValueError(f"unknown environment {name!r}; {known}{_hidden(module)}")
-    factory, options = registry[name], written | options
-    _check_options(name, factory, options)
-    key = (factory, *sorted(options.items()))
-    if key not in _made:
-        _made[key] = _new(name, factory, options)
-    return _made[key]
+    return name, registry[name], written
+
+
+@cache
+def _of_library(library: str, name: str) -> Callable[..., Environment[Any]]:
+    """Return what makes a library's environment. Raises ValueError if the library is not installed."""
+    package = LIBRARIES[library]
+    if importlib.util.find_spec(package) is None:
+        raise ValueError(f"environment '{library}:{name}' needs {package}: pip install 'jmorl[{library}]'")
+    return partial(importlib.import_module(f"envs.{library}").make, name)
 
 
 def _new(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> Environment[Any]:
@@ -102,9 +123,8 @@ def _with_options(options: dict[str, Any]) -> str:
 
 def make_anew(id: str) -> Environment[Any]:
     """Return another instance of what `make(id)` returns, to compare with. Raises ValueError as `make` does."""
-    module, name, written = _parts(id)
-    make(id)  # which imports and checks
-    return _new(name, registry[name], written)
+    make(id)  # which checks
+    return _new(*_found(id))
 
 
 def ids() -> list[str]:
@@ -141,8 +161,9 @@ def _hidden(module: str) -> str:
 def _check_options(name: str, factory: Callable[..., Environment[Any]], options: dict[str, Any]) -> None:
     """Raise ValueError for an option that there is none of, and for those that are missing."""
     parameters = inspect.signature(factory).parameters
+    any_other = any(each.kind is each.VAR_KEYWORD for each in parameters.values())
     for option in options:
-        if option not in parameters:
+        if option not in parameters and not any_other:
             known = ", ".join(parameters) or "none"
             near = did_you_mean(nearest(option, parameters))
             raise ValueError(f"environment {name!r} has no option {option!r}; known: {known}{near}")

@@ -1,6 +1,6 @@
 """The physics of a MuJoCo model through MJX, Google DeepMind's own MuJoCo in JAX.
 
-Needs the `mjx` extra. It takes models that `envs.planar` cannot, and is many times slower on a CPU.
+It takes models that `envs.planar` cannot, and is many times slower on a CPU.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class MjxPhysics:
     """`envs.physics.Physics` through MJX.
 
     `iterations` and `ls_iterations` are the most steps of the solver and of each line search; without them it takes
-    the model's, and is as accurate as MuJoCo. Raises ImportError if MJX is not installed.
+    the model's, and is as accurate as MuJoCo.
     """
 
     def __init__(self, model: mujoco.MjModel, iterations: int | None = None, ls_iterations: int | None = None):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
@@ -38,8 +37,6 @@ class Runner(Environment[BodyState]):
     def __init__(self, physics: str = "planar"):
         if physics not in PHYSICS:
             raise ValueError(f"physics must be {' or '.join(PHYSICS)}, not {physics!r}")
-        if physics == "mjx" and importlib.util.find_spec("mujoco.mjx") is None:
-            raise ValueError("physics=mjx needs MJX: pip install 'jmorl[mjx]'")
         self._backend = physics
 
     @cached_property

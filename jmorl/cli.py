@@ -404,6 +404,8 @@ def _envs(options: argparse.Namespace) -> None:
     speeds = dict(_speeds(ids, console)) if options.speed else {}
     for table in environment_tables(ids, speeds):
         console.print(table)
+    if not options.env:
+        console.print("By their names: brax:NAME, such as brax:ant; playground:NAME, such as playground:CheetahRun.")
 
 
 def _speeds(ids: Sequence[str], console: "PlainConsole") -> Iterator[tuple[str, str]]:
