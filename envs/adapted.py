@@ -12,7 +12,7 @@ from ast import literal_eval
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from functools import cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,20 +25,6 @@ STARTS = 256  # states that episodes start from: a reset of theirs costs more th
 TERM_PREFIX = "reward/"  # of a term's name in `state.metrics`, which is not written
 REWARD, CONTROL = "reward", "control"
 FORM = "write objectives=TERM+TERM/TERM, at least two objectives between slashes; NAME:TERM names one, 0.5*TERM scales"
-
-
-class Theirs(Protocol):
-    """An environment of Brax, or of MuJoCo Playground, which has the same form."""
-
-    action_size: int
-
-    def reset(self, rng: jax.Array) -> Any:
-        """Return a state."""
-        ...
-
-    def step(self, state: Any, action: jax.Array) -> Any:
-        """Return the state after a step."""
-        ...
 
 
 class Group(NamedTuple):
@@ -54,14 +40,14 @@ class Adapted(Environment[Any]):
     action_low = -1.0
     action_high = 1.0
 
-    def __init__(self, theirs: Theirs, groups: Sequence[Group]):
-        self._theirs = theirs
+    def __init__(self, theirs: Any, groups: Sequence[Group]):
+        self.theirs = theirs
         self._groups = tuple(groups)
 
     def initial_state(self, key: jax.Array) -> Any:
         """Return one of the states that episodes start from."""
         index = jax.random.randint(key, (), 0, STARTS)
-        return jax.tree.map(lambda array: array[index], starts(self._theirs))
+        return jax.tree.map(lambda array: array[index], starts(self.theirs))
 
     def observe(self, state: Any) -> jax.Array:
         """Return what the agent sees of a state."""
@@ -71,7 +57,7 @@ class Adapted(Environment[Any]):
         """Apply their dynamics to a state and an action [A]."""
         kept = jax.tree.map(lambda leaf: leaf, state)  # they write into the dictionaries of the state they are given
         with their_way():
-            found = self._theirs.step(kept, action)
+            found = self.theirs.step(kept, action)
         values = terms_of(found) | {REWARD: found.reward, CONTROL: -jnp.sum(action**2)}
         reward = [
             sum(factor * jnp.asarray(values[term], jnp.float32) for factor, term in group.terms)
@@ -82,7 +68,7 @@ class Adapted(Environment[Any]):
 
 
 @cache
-def starts(theirs: Theirs) -> Any:
+def starts(theirs: Any) -> Any:
     """Return states that episodes start from, drawn with the same seed always: arrays whose first axis is `STARTS`."""
     with jax.ensure_compile_time_eval(), their_way():  # the first use may be under a trace
         keys = jax.random.key_data(jax.random.split(jax.random.key(0), STARTS))  # they keep keys as numbers
@@ -92,7 +78,7 @@ def starts(theirs: Theirs) -> Any:
 def adapt(
     id: str,
     family: str,
-    theirs: Theirs,
+    theirs: Any,
     written: str | None,
     default: Sequence[tuple[str, str, float]],
     time_limit: int,
@@ -117,7 +103,7 @@ def adapt(
         "time_limit": time_limit,
         "step_seconds": step_seconds,
     }
-    return type(id, (Adapted,), declared)(theirs, parsed)  # type: ignore[no-any-return]
+    return type(id, (Adapted,), declared)(theirs, parsed)
 
 
 def terms_of(state: Any) -> dict[str, Any]:

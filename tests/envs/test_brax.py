@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import envs
-from envs.adapted import their_way
+from envs.adapted import Adapted, their_way
 from envs.brax import GROUPS
 from envs.checks import check_environment
 from jmorl.cli import main
@@ -41,8 +41,9 @@ def test_what_is_wrong_is_named(id, message):
 def test_an_environment_is_made_once_and_takes_options_of_theirs():
     id = "brax:reacher,time_limit=50,backend=spring"
     environment = envs.make(id)
+    assert isinstance(environment, Adapted)
     assert envs.make(id) is environment and environment.id == "brax:reacher"
-    assert environment.time_limit == 50 and environment._theirs.backend == "spring"
+    assert environment.time_limit == 50 and environment.theirs.backend == "spring"
     assert [objective.name for objective in environment.objectives] == ["distance", "energy"]
 
 
@@ -56,7 +57,8 @@ def test_importing_ours_does_not_import_theirs():
 def test_the_default_groups_add_up_to_their_reward(name):
     backend = BACKENDS.get(name, "generalized")
     environment = envs.make(f"brax:{name},backend={backend}")
-    theirs = environment._theirs
+    assert isinstance(environment, Adapted)
+    theirs = environment.theirs
 
     def step(state, action):
         found = environment.transition(state, action)

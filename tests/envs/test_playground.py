@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import envs
+from envs.adapted import Adapted
 
 pytest.importorskip("mujoco_playground")
 
@@ -27,8 +28,9 @@ def test_what_is_wrong_is_named(id, message):
 @pytest.mark.slow
 def test_the_terms_of_a_task_are_objectives():
     environment = envs.make("playground:PointMass,objectives=near:near_target/small_control/all:reward,time_limit=2")
+    assert isinstance(environment, Adapted)
     assert [objective.name for objective in environment.objectives] == ["near", "small_control", "all"]
-    assert environment.step_seconds == environment._theirs.dt and environment.time_limit == 2
+    assert environment.step_seconds == environment.theirs.dt and environment.time_limit == 2
     keys = jax.random.split(jax.random.key(0), 3)
     state, first = jax.vmap(environment.reset)(keys)
     actions = jnp.full((3, environment.action_size), 0.5)
