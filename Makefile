@@ -8,7 +8,7 @@ BROWSER := $(VENV)/.browser
 PLAYGROUND := $(VENV)/.playground
 
 .PHONY: demo studio test test-slow test-studio screenshots check format bench bench-demo bench-physics bench-checkpoints \
-	bench-selection bench-studio quality paper clean
+	bench-selection bench-studio quality fronts paper clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
@@ -54,11 +54,14 @@ bench-selection: $(INSTALLED)  ## how long the search thinks about a generation,
 bench-studio: $(BROWSER)  ## how fast the studio answers, and what it costs the training
 	$(BIN)/python -m benchmarks.studio
 
-bench-physics: $(INSTALLED)  ## accuracy and speed of the half cheetah's dynamics, beside MuJoCo and MJX (5 minutes)
+bench-physics: $(INSTALLED)  ## accuracy and speed of every runner's dynamics, beside MuJoCo and MJX (20 minutes)
 	$(BIN)/python -m benchmarks.physics
 
 quality: $(INSTALLED)  ## how good the found policies are against the exact front: 5 seeds, 3 users, 2 methods
 	$(BIN)/python -m benchmarks.quality
+
+fronts: $(INSTALLED)  ## fronts on the tasks of PGMORL's authors beside published ones: hours; goes on where it was interrupted
+	$(BIN)/python -m benchmarks.fronts
 
 paper: $(INSTALLED)  ## the paper's experiments in its units and in raw ones: hours; goes on where it was interrupted
 	$(BIN)/jmorl paper

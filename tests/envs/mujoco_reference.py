@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from benchmarks.cheetah_states import converged
+from benchmarks.runner_states import converged
 from envs.mujoco_model import load_model, quiet_mujoco
 
 

@@ -5,13 +5,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks.cheetah_states import FAR, KINDS, Steps, cheetah_steps
+from benchmarks.runner_states import FAR, RUNNERS, Steps, kinds_of, runner_of, steps_of
 from envs.planar import solver
 from envs.planar.kinematics import cos_sin
 from envs.planar.model import compile_model
 from tests.envs.mujoco_reference import Stages, States, cheetah, stages
 from tests.envs.planar_stages import QUICK_TO_COMPILE, forwarded, one_step, planar_stages, relative_difference
 
+CHEETAH = RUNNERS[0]
 MODEL = cheetah()
 COUNT = 800
 
@@ -23,7 +24,7 @@ def states_of(steps: Steps) -> States:
 @pytest.fixture(scope="module")
 def visited():
     """About `COUNT` time steps of each kind."""
-    parts = [cheetah_steps(kind, COUNT, seed) for seed, kind in enumerate(KINDS)]
+    parts = [steps_of(CHEETAH, kind, COUNT, seed) for seed, kind in enumerate(kinds_of(CHEETAH))]
     return Steps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
@@ -70,16 +71,21 @@ def test_far_away_only_x_loses_digits(single, visited):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_hundred_thousand_states(kind):
-    steps = cheetah_steps(kind, 20_000, seed=100)
-    error = errors(one_step(MODEL, states_of(steps), np.float32).qvel, steps)
+@pytest.mark.parametrize("id", RUNNERS)
+def test_a_hundred_thousand_states(id):
+    kinds = kinds_of(id)
+    parts = [steps_of(id, kind, 100_000 // len(kinds), seed=100) for kind in kinds]
+    steps = Steps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    model = runner_of(id).model
+    error = np.abs(one_step(model, states_of(steps), np.float32).qvel - steps.next_qvel).max(axis=1)
     assert np.median(error) < 1e-5
-    assert np.quantile(error, 0.999) < 5e-4
-    assert error.max() < 1e-3
-    after = one_step(MODEL, states_of(steps), np.float64)
-    assert relative_difference(after.qvel, steps.next_qvel).max() < 1e-9
-    assert relative_difference(after.qpos, steps.next_qpos).max() < 1e-9
+    assert np.quantile(error, 0.999) < 1e-3
+    after = one_step(model, states_of(steps), np.float64)
+    apart = np.maximum(
+        relative_difference(after.qvel, steps.next_qvel), relative_difference(after.qpos, steps.next_qpos)
+    )
+    # Where two capsules are parallel, MuJoCo has two contacts and `envs.planar` one: few of those folded up.
+    assert np.mean(apart > 1e-9) <= (1e-4 if "self-contact" in kinds else 0)
 
 
 def test_newton_needs_few_steps(visited):

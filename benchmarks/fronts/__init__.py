@@ -1,0 +1,1 @@
+"""Fronts on the tasks of PGMORL's authors, beside published ones."""
