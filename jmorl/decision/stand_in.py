@@ -21,8 +21,9 @@ FORMS: dict[Shows, Form] = {"front": "best", "few": "best", "pair": "pair", "ran
 
 # The expected regret up to which the stand-in answers, in shares of the utility's range over the front. A choice that
 # steers can be corrected in the next generation, the last one cannot.
-TRUSTED_REGRET = {"steer": 0.05, "final": 0.02}
+TRUSTED_REGRET = {"steer": 0.07, "final": 0.02}
 DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
+FEWEST_AGAINST = 2  # other answers that it may be against
 FEW = 5  # policies in a short question
 
 
@@ -99,7 +100,7 @@ class StandIn(Wrapper):
             return super().follow_up(question, answer)
         if not isinstance(question, Question) or not question.was_asked(answer) or question.again or answer.stop:
             return None
-        if question.purpose not in TRUSTED_REGRET or question.form != "best":
+        if question.purpose not in TRUSTED_REGRET or question.form != "best" or len(self.answers) <= FEWEST_AGAINST:
             return None
         whole = question.whole
         model = self._model(whole)

@@ -8,6 +8,7 @@ import numpy as np
 from jmorl.search.policy import Policy, values_of
 
 MOST_WIDENINGS = 7
+LIMIT_WIDENINGS = 3
 
 
 def lower_bounds(preferred: np.ndarray, delta: float, unit: np.ndarray) -> np.ndarray:
@@ -37,14 +38,14 @@ def widened_bounds(
 ) -> Bounds:
     """Return `lower_bounds`, their slack doubled until so many of the vectors reach them, 7 times at most.
 
-    Where there is a limit, the bound stays above it, or above the preferred value if that is less, but for the slack
-    before it was doubled.
+    A limit says what of an objective may be given up: there the slack is doubled at once, `LIMIT_WIDENINGS` times, but
+    the bound stays above the limit, or above the preferred value if that is less, but for the slack at first.
     """
     slack = np.maximum(delta * np.sqrt(unit * np.abs(preferred)), least_slack)
+    least = np.full(len(preferred), -np.inf) if limits is None else np.minimum(limits, preferred) - slack
+    at_once = np.where(np.isfinite(least), LIMIT_WIDENINGS, 0)
     for widenings in range(MOST_WIDENINGS + 1):
-        lower = preferred - 2**widenings * slack
-        if limits is not None:
-            lower = np.maximum(lower, np.minimum(limits, preferred) - slack)
+        lower = np.maximum(preferred - 2.0 ** np.maximum(widenings, at_once) * slack, least)
         if within(values, lower).sum() >= least_within:
             break
     return Bounds(lower, widenings)

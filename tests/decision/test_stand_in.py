@@ -13,7 +13,7 @@ from jmorl.cli import main
 from jmorl.decision.answers import Answer
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
 from jmorl.decision.scripted import ScriptedUser
-from jmorl.decision.stand_in import StandIn
+from jmorl.decision.stand_in import DOUBTED_REGRET, StandIn
 from jmorl.decision.users import make_user
 from tests.resuming import Counting, follow, go_on, outcome, train
 
@@ -482,6 +482,19 @@ def test_who_wants_to_be_asked_always_is_not_doubted(mistaken):
 def test_what_agrees_with_the_other_answers_is_not_doubted(mistaken):
     stand_in, question, _ = mistaken()
     assert stand_in.follow_up(question, chooses(question)) is None
+
+
+def test_a_first_answer_has_no_others_to_be_against(growing):
+    question = growing(5)[-1]
+    doubted = 0
+    for policy in question.front:
+        answer = Answer(policy.id)
+        stand_in = StandIn(Says(lambda asked, answer=answer: answer), 1)
+        asked, _ = stand_in.decide(question)
+        expected = stand_in._model(asked).utilities(asked.values).mean(axis=0)
+        doubted += expected.max() - expected[question.front.index(policy)] >= DOUBTED_REGRET
+        assert stand_in.follow_up(asked, answer) is None
+    assert doubted  # one answer may be taken for a random one
 
 
 def test_a_pair_or_a_ranking_is_not_asked_again(mistaken):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from jmorl.search.bounds import lower_bounds, widened_bounds, within
+from jmorl.search.bounds import MOST_WIDENINGS, lower_bounds, widened_bounds, within
 from jmorl.search.scaling import range_scale, search_scale
 
 finite = st.floats(-1e4, 1e4)
@@ -116,25 +116,31 @@ def test_bounds_that_give_way_stop_at_a_limit_less_their_slack_at_first() -> Non
     assert bounds.widenings == free.widenings == 2
 
 
-def test_a_limit_below_the_bounds_and_no_limit_at_all_change_nothing() -> None:
+def test_towards_a_limit_bounds_give_way_at_once() -> None:
+    preferred, unit, values = np.array([100.0, -4.0]), np.array([100.0, 4.0]), np.array([[100.0, -4.0]])
+    for limit, lower in ((-3.9, -4.4), (-4.0, -4.4), (-5.0, -5.4), (-6.7, -7.1), (-50.0, -7.2)):
+        bounds = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1, (-np.inf, limit))
+        np.testing.assert_allclose(bounds.lower, [90, lower])
+        assert bounds.widenings == 0
+
+
+def test_no_limit_at_all_changes_nothing() -> None:
     preferred, unit, values = np.array([100.0, -4.0]), np.array([100.0, 4.0]), np.array([[65.0, -4.0]])
     free = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1)
-    for limits in ((-np.inf, -np.inf), (40.0, -10.0)):
-        bounds = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1, limits)
-        np.testing.assert_array_equal(bounds.lower, free.lower)
-        assert bounds.widenings == free.widenings > 0
+    bounds = widened_bounds(preferred, 0.1, unit, np.zeros(2), values, 1, (-np.inf, -np.inf))
+    np.testing.assert_array_equal(bounds.lower, free.lower)
+    assert bounds.widenings == free.widenings > 0
 
 
 @given(vectors, amounts, vectors, arrays(float, (5, 3), elements=finite), st.integers(0, 5))
-def test_limits_only_raise_bounds_and_never_exclude_the_choice(
+def test_bounds_stay_above_limits_and_never_exclude_the_choice(
     preferred: np.ndarray, slack: np.ndarray, limits: np.ndarray, values: np.ndarray, least: int
 ) -> None:
-    first = preferred - slack
-    free = widened_bounds(preferred, 0.0, slack, slack, values, least)
     bounds = widened_bounds(preferred, 0.0, slack, slack, values, least, limits.tolist())
-    assert within(preferred[None], bounds.lower).all()
-    assert (bounds.lower >= np.minimum(limits, preferred) - slack).all() and (bounds.lower <= first).all()
-    assert bounds.widenings >= free.widenings
+    assert within(preferred[None], bounds.lower).all() and (bounds.lower <= preferred - slack).all()
+    assert (bounds.lower >= np.minimum(limits, preferred) - slack).all()
+    if bounds.widenings < MOST_WIDENINGS:
+        assert within(values, bounds.lower).sum() >= least
 
 
 def test_within_needs_every_objective() -> None:
