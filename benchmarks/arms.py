@@ -17,8 +17,13 @@ def add_arms(parser: argparse.ArgumentParser, result: Path) -> None:
     parser.add_argument("--users", nargs="+", choices=USERS, default=list(USERS))
     parser.add_argument("--methods", nargs="+", choices=("pgmorl", "interactive"), default=["pgmorl", "interactive"])
     parser.add_argument("--preset", default="default")
-    parser.add_argument("--set", nargs="+", default={}, action=_Nested, metavar="SECTION.NAME=VALUE")
+    add_settings(parser)
     parser.add_argument("--out", type=Path, default=result)
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add `--set`, which gives {SECTION: {NAME: VALUE}}."""
+    parser.add_argument("--set", nargs="+", default={}, action=_Nested, metavar="SECTION.NAME=VALUE")
 
 
 def arms(options: argparse.Namespace, env: str) -> Iterator[Config]:
