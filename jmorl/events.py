@@ -32,6 +32,7 @@ class Compiled:
 
     seconds: float
     devices: int
+    steps_per_second: float  # to expect in training, from one iteration
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,9 @@ class _Run:
         self.metric_weights = candidate_grid(len(environment.objectives), config.search.weight_divisions)
 
     def events(self, state: RunState | None) -> Iterator[Event]:
-        yield Compiled(self.population.compile(), self.population.devices)
+        seconds = self.population.compile()
+        rate = self.config.steps_per_iteration / self.population.iteration_seconds()
+        yield Compiled(seconds, self.population.devices, rate)
         if state is None:
             finished = self.warm_up()
             yield finished

@@ -39,6 +39,10 @@ class Population:
         """Compile what is called below. Returns the seconds it took."""
         return self.programs.compile()
 
+    def iteration_seconds(self) -> float:
+        """Return how long an iteration of all agents takes, after `compile`."""
+        return self.programs.iteration_seconds()
+
     def initialize(self, key: jax.Array) -> TrainState:
         """Return P new train states [P, ...]."""
         return self.programs.initialize(jax.random.split(key, self.size))

@@ -40,6 +40,7 @@ class Programs:
         self.episodes = config.evaluation.episodes
         self._compiling = Lock()
         self._compiled = False
+        self._iteration_seconds: float | None = None
         self.moppo = MOPPO(environment, config.ppo)
         self.devices = device_count(self.agents, jax.device_count())  # that share the agents
         mesh = Mesh(np.array(jax.devices()[: self.devices]), (AGENTS,))
@@ -68,6 +69,18 @@ class Programs:
             self._evaluate = compile_for(self._evaluate, train_states, start_keys)
             self._compiled = True
             return time.perf_counter() - started
+
+    def iteration_seconds(self) -> float:
+        """Return how long an iteration of all agents takes: of one, which is made the first time, after `compile`."""
+        with self._compiling:
+            if self._iteration_seconds is None:
+                keys = jax.random.split(jax.random.key(0), self.agents)
+                train_states = jax.device_get(self.initialize(keys))
+                weights = np.ones((self.agents, len(self.moppo.environment.objectives)), np.float32)
+                started = time.perf_counter()
+                self.train(train_states, weights, keys, Schedule(np.int32(1), np.float32(0)))
+                self._iteration_seconds = time.perf_counter() - started
+            return self._iteration_seconds
 
     def initialize(self, keys: jax.Array) -> TrainState:
         """Return a new train state for each key [N]."""

@@ -109,6 +109,10 @@ class StackedPopulation(Population, AbstractContextManager["StackedPopulation"])
         """Compile the programs for all runs that go on. Returns the seconds it took."""
         return self._stack.programs(self._stack.runs).compile()
 
+    def iteration_seconds(self) -> float:
+        """Return how long an iteration of all agents of all runs takes, after `compile`."""
+        return self._stack.programs(self._stack.runs).iteration_seconds()
+
     def _train(
         self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule
     ) -> tuple[TrainState, Diagnostics]:

@@ -109,7 +109,7 @@ class LiveView(Watcher):
         row.add_column(no_wrap=True)
         row.add_column(ratio=1)
         row.add_column(no_wrap=True)
-        unknown = timeline.finished is None
+        unknown = timeline.compiled is None
         bar = ProgressBar(total, steps, pulse=unknown, animation_time=now)
         row.add_row(phase, bar, used)
         return row
@@ -126,6 +126,7 @@ class LiveView(Watcher):
             yield "reason", REASONS[timeline.result.reason]
         elif timeline.finished is None:
             yield "time", duration(now - timeline.since)
+            yield from _remaining(timeline, now)
         else:
             yield from _remaining(timeline, now)
         if timeline.finished:

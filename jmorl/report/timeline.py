@@ -38,8 +38,7 @@ class Timeline:
     @property
     def total_steps(self) -> int:
         """Environment steps of a run that does not end early; the budget, rounded up to a generation."""
-        warmup = self.config.population.warmup_iterations * self.config.steps_per_iteration
-        return warmup + self.generations * self.generation_steps
+        return self.warmup_steps + self.generations * self.generation_steps
 
     def after(self, event: Event, now: float) -> "Timeline":
         """Return the timeline when `event` has just happened."""
@@ -58,10 +57,15 @@ class Timeline:
             case RunFinished():
                 return replace(self, phase="finished", since=now, result=event)
 
+    @property
+    def warmup_steps(self) -> int:
+        """Environment steps of the warm-up."""
+        return self.config.population.warmup_iterations * self.config.steps_per_iteration
+
     def generation_seconds(self) -> float | None:
-        """How long a generation takes, judged by the last one; None before the first."""
+        """How long a generation takes, judged by the last one, or by one iteration; None before that."""
         if self.finished is None:
-            return None
+            return self.generation_steps / self.compiled.steps_per_second if self.compiled else None
         seconds, population = self.finished.seconds, self.config.population
         if self.finished.state.generation:
             return seconds.total
@@ -70,7 +74,8 @@ class Timeline:
     def steps(self, now: float) -> int:
         """Environment steps so far; within a generation as many as it should have made by now."""
         if self.finished is None:
-            return self.resumed.steps if self.resumed else 0
+            made = (now - self.since) * self.compiled.steps_per_second if self.compiled else 0.0
+            return self.resumed.steps if self.resumed else min(int(made), self.warmup_steps)
         expected = self.generation_seconds()
         share = min((now - self.since) / expected, 1.0) if self.phase == "generation" and expected else 0.0
         return self.finished.steps + int(share * self.generation_steps)
@@ -83,6 +88,9 @@ class Timeline:
 
     def seconds_to_end(self, now: float) -> float | None:
         """How long until the end, the time for answers not counted; None if that is not known."""
+        if self.phase == "warm-up" and self.compiled:
+            warmup = self.warmup_steps / self.compiled.steps_per_second
+            return max(warmup - (now - self.since), 0.0) + (self._seconds(now, self.generations) or 0.0)
         left = self.generations - self.generation
         return self._seconds(now, left if self.phase == "generation" else left + 1)
 

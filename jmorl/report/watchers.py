@@ -63,7 +63,8 @@ class Lines(Watcher):
     def __init__(self, config: Config, objectives: tuple[Objective, ...], console: PlainConsole):
         self.objectives = objectives
         self.console = console
-        self.generations = Timeline(config, since=0.0).generations
+        self.timeline = Timeline(config, since=0.0)
+        self.generations = self.timeline.generations
 
     def show(self, event: Event) -> None:
         """Show what has just happened."""
@@ -74,7 +75,11 @@ class Lines(Watcher):
     def _line(self, event: Event) -> str:
         match event:
             case Compiled():
-                return f"compiled in {duration(event.seconds)} on {plural(event.devices, 'device')}"
+                total, rate = self.timeline.total_steps, event.steps_per_second
+                return (
+                    f"compiled in {duration(event.seconds)} on {plural(event.devices, 'device')}; "
+                    f"{short_count(total)} steps at about {short_count(rate)} steps/s take {duration(total / rate)}"
+                )
             case Resumed():
                 front = len(event.state.archive.members)
                 return f"resumed after {self._name(event.state.generation)}, with a front of {front}"
@@ -116,7 +121,7 @@ class Json(Watcher):
 
     `event` says which one, and `values`, `std`, `weights` and `bounds` have a number for each objective:
 
-        {"event": "compiled", "seconds", "devices"}
+        {"event": "compiled", "seconds", "devices", "steps_per_second": to expect}
         {"event": "resumed", "generation": the last one finished, "steps"}
         {"event": "generation", "generation": 0 is the warm-up, "generations": in the budget, "steps",
          "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",

@@ -52,7 +52,7 @@ def events_of(
     described = OBJECTIVES[:objectives]
     unbounded = np.full(objectives, -np.inf)
     state = RunState(PGMORLState(PerformanceBuffer(100, 4), Records.empty(objectives), unbounded))
-    events: list[Event] = [Compiled(3.21, 2)]
+    events: list[Event] = [Compiled(3.21, 2, 40_000.0)]
     policies: list[Policy] = []
     for generation in range(generations + 1):
         bounds, choice = state.search.bounds, state.choice

@@ -58,7 +58,7 @@ def test_a_resumed_run_goes_on_where_it_was(make_events):
     compiled, *_, finished, decided = make_events(generations=3)[:5]
     after = timelines([compiled, Resumed(finished.state, finished.steps, finished.bounds, 0), decided], config_of())
     assert [(each.phase, each.generation) for each in after] == [("warm-up", 0), ("question", 2), ("generation", 2)]
-    assert [each.steps(100.0) for each in after] == [0, finished.steps, finished.steps]
+    assert [each.steps(100.0) for each in after] == [240_000, finished.steps, finished.steps]
 
 
 def test_without_questions_generations_follow_each_other(make_events):
@@ -101,10 +101,18 @@ def test_a_run_without_questions_waits_for_none(make_events):
     assert timeline.seconds_to_end(4.0) == pytest.approx(10 * 10.0)
 
 
-def test_nothing_is_known_before_the_warm_up_is_over(make_events):
-    *_, timeline = timelines(make_events()[:1], config_of())
+def test_nothing_is_known_while_it_compiles():
+    timeline = Timeline(config_of(), since=0.0)
     assert timeline.steps(50.0) == 0
     assert timeline.seconds_to_end(50.0) is None and timeline.seconds_to_question(50.0) is None
+
+
+def test_in_the_warm_up_one_iteration_tells_how_long_everything_takes(make_events):
+    *_, timeline = timelines(make_events()[:1], config_of())  # since second 2, with 40,000 steps a second
+    assert [timeline.steps(now) for now in (2.0, 3.5, 50.0)] == [0, 60_000, 240_000]
+    assert timeline.seconds_to_end(2.0) == pytest.approx(timeline.total_steps / 40_000)
+    assert timeline.seconds_to_end(50.0) == pytest.approx((timeline.total_steps - 240_000) / 40_000)
+    assert timeline.seconds_to_question(50.0) is None
 
 
 def test_a_longer_generation_than_the_warm_up_takes_longer(make_events):
