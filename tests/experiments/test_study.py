@@ -9,6 +9,7 @@ from jmorl.config import ConfigError
 from jmorl.experiments.cells import Places, distinct, missing
 from jmorl.experiments.record import ConfirmedScore, FreshScore, QuestionRecord
 from jmorl.experiments.study.command import make_study
+from jmorl.experiments.study.figures import targets_figure
 from jmorl.experiments.study.plan import Study, StudyPart, read_plan
 from jmorl.experiments.study.results import calibration, gained, target_rows, user_rows
 from tests.experiments.made import CAR, ITERATION, record
@@ -96,6 +97,19 @@ def test_targets_have_rows_of_their_own():
     run = record([[(-100, -60)], [(-80, -50)]], chosen=1)
     [row] = target_rows(STUDY, part, {key("interactive", "near", 2): run})
     assert (row.target, row.values, row.seeds, row.times.reached) == ("near", (-80, -50), (2,), (20 * ITERATION,))
+
+
+def test_a_figure_of_targets_shows_every_run():
+    """Targets share an axis; the runs to the first one need the fewest steps."""
+    [part] = STUDY.parts
+    run = record([[(-100, -60)], [(-80, -50)]], chosen=1)
+    [row] = target_rows(STUDY, part, {key("interactive", "near", 2): run})
+    far = replace(row, target="far", times=replace(row.times, reached=(None,), budget=50 * ITERATION))
+    figure = targets_figure([row, far], "targets")
+    for axes, steps in zip(figure.axes, (20 * ITERATION, 50 * ITERATION), strict=True):
+        [marks] = axes.collections
+        assert marks.get_offsets()[0, 1] == pytest.approx(steps / 1e6)
+        assert axes.get_ylim()[0] == 0 and axes.get_ylim()[1] > steps / 1e6
 
 
 def test_forecasts_and_confirmed_scores_are_judged():

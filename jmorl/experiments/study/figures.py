@@ -80,6 +80,6 @@ def targets_figure(rows: Sequence[TargetRow], title: str) -> Figure:
             axes.scatter(places, steps, marker=mark, s=22, ec=colour, fc=np.where(reached, colour, "white"))
         axes.set_title(f"target {target}")
         axes.set_xticks(range(len(methods)), methods, rotation=20, ha="right")
-        axes.set_ylim(bottom=0)
+    grid[0].set_ylim(bottom=0)  # after all is drawn: from now on the axis, which all share, keeps its upper end
     grid[0].set_ylabel("million steps; open: never reached")
     return figure
