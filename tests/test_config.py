@@ -201,7 +201,7 @@ def test_a_config_cannot_be_changed_in_place():
         ({"method": "interactve"}, "; did you mean 'interactive'?"),
         ({"evaluation": {"units": "papr"}}, "must be 'raw' or 'paper', not 'papr'; did you mean 'paper'?"),
         ({"env": "mo-mountaincar-v0"}, "; did you mean 'mo-mountaincarcontinuous-v0'?"),
-        ({"user": "weight=1,2"}, "terminal, script=FILE; did you mean 'weights'?"),
+        ({"user": "weight=1,2"}, "terminal; script=FILE; did you mean 'weights'?"),
         ({"user": "b"}, "script=FILE; did you mean 'B'?"),
         ({"ppo": {"epochs": "9" * 20}}, "ppo.epochs: must be at most 2147483647, not"),
         ({"ppo": {"clip": 1e300}}, "ppo.clip: must be at most 3.4028234663852886e+38, not 1e+300"),
