@@ -41,6 +41,7 @@ __all__ = [
 ]
 
 ID = re.compile(r"[^\s,:]+")
+OUTSIDE_BRACKETS = re.compile(r",(?![^(\[]*[)\]])")  # commas between options, and not within a value
 LIBRARIES = {"brax": "brax", "playground": "mujoco_playground"}  # whose environments can be made, and their packages
 registry: dict[str, Callable[..., Environment[Any]]] = {}  # what `register` fills: factories by id
 _made: dict[
@@ -177,7 +178,7 @@ def _check_options(name: str, factory: Callable[..., Environment[Any]], options:
 
 def _parts(id: str) -> tuple[str, str, dict[str, str]]:
     """Return module, plain id and options of an id as written."""
-    place, *options = id.split(",")
+    place, *options = OUTSIDE_BRACKETS.split(id)
     module = place.rpartition(":")[0]
     pairs = [option.partition("=") for option in options]
     if not all(option and equals for option, equals, _ in pairs):

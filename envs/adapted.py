@@ -24,6 +24,7 @@ from envs.names import did_you_mean, nearest
 STARTS = 256  # states that episodes start from: a reset of theirs costs more than many steps
 TERM_PREFIX = "reward/"  # of a term's name in `state.metrics`, which is not written
 REWARD, CONTROL = "reward", "control"
+KEY = "rng"  # in `state.info`: what they draw noise and commands with
 FORM = "write objectives=TERM+TERM/TERM, at least two objectives between slashes; NAME:TERM names one, 0.5*TERM scales"
 
 
@@ -45,9 +46,13 @@ class Adapted(Environment[Any]):
         self._groups = tuple(groups)
 
     def initial_state(self, key: jax.Array) -> Any:
-        """Return one of the states that episodes start from."""
-        index = jax.random.randint(key, (), 0, STARTS)
-        return jax.tree.map(lambda array: array[index], starts(self.theirs))
+        """Return one of the states that episodes start from, with a key of the episode's own where they keep one."""
+        place_key, own_key = jax.random.split(key)
+        index = jax.random.randint(place_key, (), 0, STARTS)
+        state = jax.tree.map(lambda array: array[index], starts(self.theirs))
+        if KEY not in state.info:
+            return state
+        return state.replace(info=state.info | {KEY: jax.random.key_data(own_key).astype(state.info[KEY].dtype)})
 
     def observe(self, state: Any) -> jax.Array:
         """Return what the agent sees of a state."""
@@ -89,6 +94,10 @@ def adapt(
     `written` groups terms as in `FORM`; without it, `default` does: for each objective its group as it would be
     written, the unit of its return, and the highest one. Raises ValueError with all that is wrong.
     """
+    if written is not None and not isinstance(written, str):
+        raise ValueError(f"objectives: {written!r} is no text; {FORM}")
+    if step_seconds <= 0:
+        raise ValueError(f"a step must take some time, and takes {step_seconds:g} seconds")
     with their_way():
         state = jax.eval_shape(theirs.reset, jax.eval_shape(lambda: jax.random.key_data(jax.random.key(0))))
     groups = default if written is None else [(group, "reward", math.inf) for group in written.split("/")]
@@ -108,7 +117,8 @@ def adapt(
 
 def terms_of(state: Any) -> dict[str, Any]:
     """Return what their state tells of its reward, by the names that are written."""
-    return {name.removeprefix(TERM_PREFIX): value for name, value in state.metrics.items()}
+    named = {name.removeprefix(TERM_PREFIX).replace("/", "_"): value for name, value in state.metrics.items()}
+    return {name: value for name, value in named.items() if name not in (REWARD, CONTROL)}
 
 
 def observation(state: Any) -> Any:
@@ -124,8 +134,8 @@ def _parsed(groups: Sequence[tuple[str, str, float]], known: Sequence[str]) -> l
         terms = [_term(term) for term in (after if colon else before).split("+")]
         name = before.strip() if colon else "+".join(term.removeprefix("reward_") for _, term in terms)
         found.append(Group(Objective(name, name, unit, highest), tuple(terms)))
-        wrong += [f"{written!r} has a term without a name or a finite factor; {FORM}"] * (
-            not name or any(not term or not math.isfinite(factor) for factor, term in terms)
+        wrong += [f"{written!r} has a term without a name or a factor; {FORM}"] * (
+            not name or any(not term or not math.isfinite(factor) or not factor for factor, term in terms)
         )
         wrong += [
             f"there is no term {term!r}{did_you_mean(nearest(term, known))}"
@@ -166,10 +176,16 @@ def literal(value: Any) -> Any:
 
 
 @contextmanager
+def unseen() -> Iterator[None]:
+    """Let their code print, too: while one of them is imported or made."""
+    with redirect_stdout(io.StringIO()), their_way():
+        yield
+
+
+@contextmanager
 def their_way() -> Iterator[None]:
-    """Let their code print, warn and mix shapes and types as it likes, unseen."""
+    """Let their code warn, and mix shapes and types, as it likes."""
     with ExitStack() as stack:
-        stack.enter_context(redirect_stdout(io.StringIO()))
         stack.enter_context(quiet_mujoco())
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")

@@ -13,32 +13,34 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from envs.adapted import CONTROL, REWARD, adapt, literal, positive, their_way
+from envs.adapted import CONTROL, REWARD, adapt, literal, positive, unseen
 from envs.core import Environment
 from envs.failures import failure
 from envs.names import did_you_mean, nearest
 
 ENERGY = (f"energy:{CONTROL}", "(-control²)·steps", 0.0)
+OURS = ("episode_length", "action_repeat")  # of a config: for their own training; `time_limit` is in place of the first
 EFFORT = ("torques", "energy", "action_rate", "dof_acc", "dof_vel")  # terms that are about how the motors work
 
 
 def make(
-    name: str, objectives: str | None = None, time_limit: str | int | None = None, **options: Any
+    name: str, /, objectives: str | None = None, time_limit: str | int | None = None, **options: Any
 ) -> Environment[Any]:
     """Return MuJoCo Playground's environment of this name. Options that are not ours change its config.
 
     Raises ValueError for a name, a group of terms or an option that is wrong, and for what of theirs breaks down.
     """
-    with their_way():
+    with unseen():
         from mujoco_playground import dm_control_suite, registry
 
         if name not in registry.ALL_ENVS:
             near = did_you_mean(nearest(name, registry.ALL_ENVS))
             raise ValueError(f"MuJoCo Playground has no {name!r}; it has {', '.join(sorted(registry.ALL_ENVS))}{near}")
         config = registry.get_default_config(name)
-        unknown = [option for option in options if option not in config]
+        theirs = [option for option in config if option not in OURS]
+        unknown = [option for option in options if option not in theirs]
         if unknown:
-            allowed = ", ".join(("objectives", "time_limit", *config))
+            allowed = ", ".join(("objectives", "time_limit", *theirs))
             raise ValueError(f"there is no option {', '.join(unknown)}; known: {allowed}")
         try:
             environment = _loaded(name, **options)
@@ -46,7 +48,7 @@ def make(
             robots = name not in dm_control_suite.ALL_ENVS
             advice = "; its robots are downloaded when one is made first, which needs a network, once" if robots else ""
             raise ValueError(f"MuJoCo Playground refuses it: {failure(error)}{advice}") from error
-    limit = positive("time_limit", time_limit or config.episode_length)
+    limit = positive("time_limit", config.episode_length if time_limit is None else time_limit)
     default = _groups(name, config)
     return adapt(f"playground:{name}", "MuJoCo Playground", environment, objectives, default, limit, environment.dt)
 

@@ -33,6 +33,7 @@ class Compiled:
     seconds: float
     devices: int
     steps_per_second: float  # to expect in training, from one iteration
+    steps: int = 0  # that were made before, of a run that goes on
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ class _Run:
     def events(self, state: RunState | None) -> Iterator[Event]:
         seconds = self.population.compile()
         rate = self.config.steps_per_iteration / self.population.iteration_seconds()
-        yield Compiled(seconds, self.population.devices, rate)
+        yield Compiled(seconds, self.population.devices, rate, self._steps(state) if state else 0)
         if state is None:
             finished = self.warm_up()
             yield finished

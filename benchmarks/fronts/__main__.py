@@ -26,7 +26,6 @@ from jmorl.experiments.tables import million
 from jmorl.learning.devices import use_all_cpu_cores
 
 HERE = Path(__file__).parent
-PILOTS = Path("runs/fronts-pilots")
 SHARES = np.array([0.1, 0.25, 0.5, 0.75, 1.0])  # of the budget, after which a pilot's hypervolume is printed
 
 
@@ -47,7 +46,7 @@ def main() -> None:
     if options.pilot:
         for env in options.only:
             for seed in options.pilot:
-                print(_pilot(env, seed, options.set), flush=True)
+                print(_pilot(env, seed, options.set, options.work / "pilots"), flush=True)
         return
     console = PlainConsole()
     places = Places(HERE / "records", options.work)
@@ -57,10 +56,10 @@ def main() -> None:
     console.print(f"report: {write_report(HERE, records)}", soft_wrap=True)
 
 
-def _pilot(env: str, seed: int, settings: dict[str, dict[str, str]]) -> str:
+def _pilot(env: str, seed: int, settings: dict[str, dict[str, str]], work: Path) -> str:
     """Make a run, or find it, and say how its hypervolume grew."""
     config = cell(env, "PGMORL", seed).config.replace(**settings)
-    pilot, places = Cell(config.identity(), config), Places(PILOTS / "records", PILOTS / "work")
+    pilot, places = Cell(config.identity(), config), Places(work / "records", work / "work")
     made = make([pilot], places, lambda *_: None)[0] if missing([pilot], places) else read_record(places.record(pilot))
     result, there = Result(made), published(env)
     marks = np.searchsorted(made.steps, SHARES * made.total_steps).clip(max=len(made.steps) - 1)

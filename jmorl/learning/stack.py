@@ -94,6 +94,7 @@ class StackedPopulation(Population, AbstractContextManager["StackedPopulation"])
         super().__init__(stack.environment, stack.config)
         self._stack = stack
         self._number = number
+        self._together = self.programs  # of all runs that go on, once they are compiled
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -107,11 +108,12 @@ class StackedPopulation(Population, AbstractContextManager["StackedPopulation"])
 
     def compile(self) -> float:
         """Compile the programs for all runs that go on. Returns the seconds it took."""
-        return self._stack.programs(self._stack.runs).compile()
+        self._together = self._stack.programs(self._stack.runs)
+        return self._together.compile()
 
     def iteration_seconds(self) -> float:
         """Return how long an iteration of all agents of all runs takes, after `compile`."""
-        return self._stack.programs(self._stack.runs).iteration_seconds()
+        return self._together.iteration_seconds()
 
     def _train(
         self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule

@@ -75,10 +75,11 @@ class Lines(Watcher):
     def _line(self, event: Event) -> str:
         match event:
             case Compiled():
-                total, rate = self.timeline.total_steps, event.steps_per_second
+                left, rate = max(self.timeline.total_steps - event.steps, 0), event.steps_per_second
                 return (
                     f"compiled in {duration(event.seconds)} on {plural(event.devices, 'device')}; "
-                    f"{short_count(total)} steps at about {short_count(rate)} steps/s take {duration(total / rate)}"
+                    f"training {short_count(left)} steps at about {short_count(rate)} steps/s "
+                    f"takes {duration(left / rate)}"
                 )
             case Resumed():
                 front = len(event.state.archive.members)
@@ -121,7 +122,7 @@ class Json(Watcher):
 
     `event` says which one, and `values`, `std`, `weights` and `bounds` have a number for each objective:
 
-        {"event": "compiled", "seconds", "devices", "steps_per_second": to expect}
+        {"event": "compiled", "seconds", "devices", "steps_per_second": to expect, "steps": made before}
         {"event": "resumed", "generation": the last one finished, "steps"}
         {"event": "generation", "generation": 0 is the warm-up, "generations": in the budget, "steps",
          "evaluation_steps", "steps_per_second", "seconds": {"select", "train", "evaluate"}, "candidates",

@@ -104,13 +104,42 @@ def test_episodes_start_from_states_drawn_once():
     np.testing.assert_array_equal(observations, jax.vmap(second.reset)(keys)[1])
 
 
+def test_every_episode_draws_with_a_key_of_its_own():
+    keys = jax.random.split(jax.random.key(1), 2000)
+    states, _ = jax.vmap(cart().reset)(keys)
+    own = states.physics.info["rng"]
+    assert own.dtype == starts(Cart()).info["rng"].dtype and len(np.unique(own, axis=0)) == len(keys)
+
+
+def test_terms_with_a_slash_can_be_written_and_ours_are_not_hidden():
+    class Falling(Cart):
+        def reset(self, rng):
+            state = super().reset(rng)
+            more = {"reward": state.reward, "termination/fall": state.reward}
+            return state.replace(metrics=state.metrics | more)
+
+    environment = cart("termination_fall/reward", Falling())
+    assert [objective.name for objective in environment.objectives] == ["termination_fall", "reward"]
+    state, [step] = stepped(environment, [0.5])
+    assert step.reward[1] == pytest.approx(float(state.physics.reward)) != 0
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(ValueError, match="'0[*]near' has a term without a name or a factor"):
+        cart("0*near/effort")
+    with pytest.raises(ValueError, match="is no text; write objectives="):
+        cart(("near", "effort"))
+    with pytest.raises(ValueError, match="a step must take some time"):
+        adapt("library:cart", "A library", Cart(), None, DEFAULT, 7, 0.0)
+
+
 def test_all_that_is_wrong_with_groups_is_named_at_once():
     with pytest.raises(ValueError) as error:
         cart("a:nea+x*effort/a:place/:effort/near+")
     said = str(error.value)
     assert said.endswith("The terms there are: effort, near, place, reward, control")
     assert "there is no term 'nea'; did you mean 'near'?" in said
-    assert "'a:nea+x*effort' has a term without a name or a finite factor" in said
+    assert "'a:nea+x*effort' has a term without a name or a factor" in said
     assert "two objectives are called 'a'" in said
     assert "':effort' has a term without a name" in said and "'near+' has a term without a name" in said
 

@@ -30,6 +30,10 @@ SMALL += ["--ppo.environments", "4", "--ppo.rollout-steps", "64", "--evaluation.
         ("brax:ant,colour=red", "there is no option colour; known: objectives, time_limit, backend, .*healthy_reward"),
         ("brax:ant,backend=magic", "Brax refuses it: ValueError: backend should be in"),
         ("brax:ant,time_limit=0", "time_limit must be a whole number above zero, not '0'"),
+        ("brax:ant,name=x", "there is no option name; known"),
+        ("brax:ant,healthy_z_range=(0.2,1.0),colour=red", "there is no option colour"),
+        ("brax:reacher,n_frames=0", "a step must take some time"),
+        ("brax:fast", "Brax has no 'fast'"),
         ("brax:", "Brax has no ''; it has ant"),
     ],
 )

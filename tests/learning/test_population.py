@@ -47,6 +47,13 @@ def assert_close(left, right, tolerance=1e-5):
         np.testing.assert_allclose(a, b, rtol=tolerance, atol=tolerance)
 
 
+def test_an_iteration_is_timed_once(population, monkeypatch):
+    population.compile()
+    seconds = population.iteration_seconds()
+    monkeypatch.setattr(population.programs, "train", None)
+    assert population.iteration_seconds() == seconds > 0
+
+
 def test_agents_start_different(start):
     kernels = start.parameters["actor"]["params"]["MLP_0"]["Dense_0"]["kernel"]
     assert len(np.unique(kernels.reshape(len(kernels), -1), axis=0)) == len(kernels)

@@ -28,7 +28,7 @@ def shown(kind, events, width=80, height=40, objectives=2, **config):
 def test_there_is_a_line_for_every_event_and_the_result_as_a_table(make_events):
     events = make_events()
     lines = shown("lines", events).splitlines()
-    assert lines[0].endswith("; 2.64 M steps at about 40.0 k steps/s take 1 min 6 s")
+    assert lines[0].endswith("; training 2.64 M steps at about 40.0 k steps/s takes 1 min 6 s")
     starts = ["compiled in 3.2 s on 2 devices", "warm-up: 240 k steps, 23.5 k steps/s, front of 4,"]
     for generation in range(1, 11):
         starts += [f"choice for generation {generation}: policy ", f"generation {generation} of 10: "]
