@@ -24,6 +24,11 @@ from envs.names import did_you_mean, nearest
 STARTS = 256  # states that episodes start from: a reset of theirs costs more than many steps
 TERM_PREFIX = "reward/"  # of a term's name in `state.metrics`, which is not written
 REWARD, CONTROL = "reward", "control"
+# Groups for environments of which nothing else is known: terms, the unit of the return, and the highest return.
+REWARD_AND_CONTROL = (
+    (f"task:{REWARD}", "reward", math.inf),
+    (f"energy:{CONTROL}", "(-control²)·steps", 0.0),
+)
 KEY = "rng"  # in `state.info`: what they draw noise and commands with
 FORM = "write objectives=TERM+TERM/TERM, at least two objectives between slashes; NAME:TERM names one, 0.5*TERM scales"
 

@@ -1,8 +1,10 @@
 """Brax's environments: `brax:NAME`, with options `objectives`, `time_limit` and any of theirs, such as `backend`.
 
-brax:ant
-brax:ant,objectives=forward_reward+reward_survive/reward_ctrl
-brax:hopper,backend=spring,time_limit=500
+    brax:ant
+    brax:ant,objectives=forward_reward+reward_survive/reward_ctrl
+    brax:hopper,backend=spring,time_limit=500
+
+The terms of their rewards, and the names of these, are Brax's.
 """
 
 import inspect
@@ -10,12 +12,12 @@ import math
 from functools import cache
 from typing import Any
 
-from envs.adapted import CONTROL, REWARD, adapt, literal, positive, unseen
+from envs.adapted import REWARD_AND_CONTROL, adapt, literal, positive, unseen
 from envs.core import Environment
 from envs.failures import failure
 from envs.names import did_you_mean, nearest
 
-TESTS_OWN = {"fast"}  # of their own tests
+OF_THEIR_TESTS = {"fast"}  # which have no physics
 TIME_LIMIT = 1000  # steps, as theirs is unless somebody says otherwise
 # For each objective: its terms, the unit of its return, and the highest return.
 GROUPS: dict[str, tuple[tuple[str, str, float], ...]] = {
@@ -48,7 +50,6 @@ GROUPS: dict[str, tuple[tuple[str, str, float], ...]] = {
         ("energy:reward_ctrl", "(-0.001 control²)·steps", 0.0),
     ),
 }
-OTHERWISE = (("task:" + REWARD, "reward", math.inf), ("energy:" + CONTROL, "(-control²)·steps", 0.0))
 
 
 def make(
@@ -61,7 +62,7 @@ def make(
     with unseen():
         from brax import envs as theirs
 
-        known = sorted(theirs._envs.keys() - TESTS_OWN)  # there is no other list
+        known = sorted(theirs._envs.keys() - OF_THEIR_TESTS)  # there is no other list
         if name not in known:
             raise ValueError(f"Brax has no {name!r}; it has {', '.join(known)}{did_you_mean(nearest(name, known))}")
         own = [each for each in inspect.signature(theirs._envs[name]).parameters if each != "kwargs"]
@@ -75,7 +76,7 @@ def make(
         except Exception as error:
             raise ValueError(f"Brax refuses it: {failure(error)}") from error
     limit = positive("time_limit", time_limit)
-    return adapt(f"brax:{name}", "Brax", environment, objectives, GROUPS.get(name, OTHERWISE), limit, seconds)
+    return adapt(f"brax:{name}", "Brax", environment, objectives, GROUPS.get(name, REWARD_AND_CONTROL), limit, seconds)
 
 
 @cache  # so that the states that episodes start from are computed once

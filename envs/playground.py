@@ -13,12 +13,11 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from envs.adapted import CONTROL, REWARD, adapt, literal, positive, unseen
+from envs.adapted import REWARD_AND_CONTROL, adapt, literal, positive, unseen
 from envs.core import Environment
 from envs.failures import failure
 from envs.names import did_you_mean, nearest
 
-ENERGY = (f"energy:{CONTROL}", "(-control²)·steps", 0.0)
 OURS = ("episode_length", "action_repeat")  # of a config: for their own training; `time_limit` is in place of the first
 EFFORT = ("torques", "energy", "action_rate", "dof_acc", "dof_vel")  # terms that are about how the motors work
 
@@ -73,5 +72,5 @@ def _groups(name: str, config: Any) -> Sequence[tuple[str, str, float]]:
     effort = [term for term in scales if term in EFFORT]
     task = [term for term in scales if term not in EFFORT]
     if not effort or not task:
-        return ((f"task:{REWARD}", "reward", math.inf), ENERGY)
+        return REWARD_AND_CONTROL
     return (f"task:{'+'.join(task)}", "reward", math.inf), (f"effort:{'+'.join(effort)}", "reward", math.inf)
