@@ -89,7 +89,8 @@ def _found(id: str) -> tuple[str, Callable[..., Environment[Any]], dict[str, str
     if module:
         _import(id, module)
     if name not in registry:
-        known = f"known: {', '.join(ids())}{did_you_mean(nearest(name, ids()))}"
+        families = ", ".join(f"{library}:NAME" for library in LIBRARIES)
+        known = f"known: {', '.join(ids())}, {families}{did_you_mean(nearest(name, ids()))}"
         raise ValueError(f"unknown environment {name!r}; {known}{_hidden(module)}")
     return name, registry[name], written
 

@@ -9,7 +9,7 @@ import math
 import re
 import warnings
 from ast import literal_eval
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from functools import cache
 from typing import Any, NamedTuple
@@ -29,6 +29,7 @@ REWARD_AND_CONTROL = (
     (f"task:{REWARD}", "reward", math.inf),
     (f"energy:{CONTROL}", "(-control²)·steps", 0.0),
 )
+WHOLE = re.compile(r"[1-9][0-9]{0,8}")  # a whole number above zero
 KEY = "rng"  # in `state.info`: what they draw noise and commands with
 FORM = "write objectives=TERM+TERM/TERM, at least two objectives between slashes; NAME:TERM names one, 0.5*TERM scales"
 
@@ -91,22 +92,28 @@ def adapt(
     theirs: Any,
     written: str | None,
     default: Sequence[tuple[str, str, float]],
-    time_limit: int,
-    step_seconds: float,
+    time_limit: str | int,
+    wrong: Sequence[str],
 ) -> Environment[Any]:
     """Return their environment as one of ours, a class of its own.
 
     `written` groups terms as in `FORM`; without it, `default` does: for each objective its group as it would be
-    written, the unit of its return, and the highest one. Raises ValueError with all that is wrong.
+    written, the unit of its return, and the highest one. Raises ValueError with all that is wrong: what is in `wrong`
+    already, and what this finds.
     """
-    if written is not None and not isinstance(written, str):
-        raise ValueError(f"objectives: {written!r} is no text; {FORM}")
+    step_seconds = float(theirs.dt)
+    wrong = list(wrong)
     if step_seconds <= 0:
-        raise ValueError(f"a step must take some time, and takes {step_seconds:g} seconds")
+        wrong.append(f"a step must take some time, and takes {step_seconds:g} seconds")
+    if not WHOLE.fullmatch(str(time_limit)):
+        wrong.append(f"time_limit must be a whole number above zero, not {str(time_limit)!r}")
     with their_way():
         state = jax.eval_shape(theirs.reset, jax.eval_shape(lambda: jax.random.key_data(jax.random.key(0))))
-    groups = default if written is None else [(group, "reward", math.inf) for group in written.split("/")]
-    parsed = _parsed(groups, (*sorted(terms_of(state)), REWARD, CONTROL))
+    groups = default if written is None else [(group, "reward", math.inf) for group in str(written).split("/")]
+    parsed, wrong_groups = _parsed(groups, (*sorted(terms_of(state)), REWARD, CONTROL))
+    wrong += wrong_groups
+    if wrong:
+        raise ValueError("; ".join(wrong))
     declared = {
         "__doc__": f"{family}'s {id}.",
         "id": id,
@@ -114,7 +121,7 @@ def adapt(
         "objectives": tuple(group.objective for group in parsed),
         "observation_size": int(observation(state).shape[-1]),
         "action_size": int(theirs.action_size),
-        "time_limit": time_limit,
+        "time_limit": int(time_limit),
         "step_seconds": step_seconds,
     }
     return type(id, (Adapted,), declared)(theirs, parsed)
@@ -131,8 +138,8 @@ def observation(state: Any) -> Any:
     return state.obs if hasattr(state.obs, "shape") else state.obs["state"]
 
 
-def _parsed(groups: Sequence[tuple[str, str, float]], known: Sequence[str]) -> list[Group]:
-    """Return groups as written, with the unit and the highest return of each. Raises ValueError."""
+def _parsed(groups: Sequence[tuple[str, str, float]], known: Sequence[str]) -> tuple[list[Group], list[str]]:
+    """Return groups as written, with the unit and the highest return of each, and what is wrong with them."""
     found, wrong = [], []
     for written, unit, highest in groups:
         before, colon, after = written.partition(":")
@@ -151,9 +158,7 @@ def _parsed(groups: Sequence[tuple[str, str, float]], known: Sequence[str]) -> l
     wrong += [f"two objectives are called {name!r}" for name in dict.fromkeys(names) if names.count(name) > 1]
     if len(found) < 2:
         wrong.append(f"there is one objective; {FORM}")
-    if wrong:
-        raise ValueError(f"objectives: {'; '.join(wrong)}. The terms there are: {', '.join(known)}")
-    return found
+    return found, [f"objectives: {'; '.join(wrong)}; the terms there are: {', '.join(known)}"] if wrong else []
 
 
 def _term(written: str) -> tuple[float, str]:
@@ -165,11 +170,15 @@ def _term(written: str) -> tuple[float, str]:
         return math.nan, name.strip()
 
 
-def positive(name: str, written: str | int) -> int:
-    """Return the whole number above zero that an option is. Raises ValueError."""
-    if not re.fullmatch(r"[1-9][0-9]{0,8}", str(written)):
-        raise ValueError(f"{name} must be a whole number above zero, not {str(written)!r}")
-    return int(written)
+def split_options(options: Mapping[str, Any], theirs: Iterable[str]) -> tuple[dict[str, Any], list[str]]:
+    """Return the options that are theirs, and what is wrong with others. One of ours is none of theirs."""
+    allowed = dict.fromkeys(theirs)
+    known = ", ".join(("objectives", "time_limit", *allowed))
+    wrong = [
+        f"there is no option {name!r}{did_you_mean(nearest(name, allowed))}" for name in options if name not in allowed
+    ]
+    kept = {name: value for name, value in options.items() if name in allowed}
+    return kept, [f"{'; '.join(wrong)}; the options there are: {known}"] if wrong else []
 
 
 def literal(value: Any) -> Any:

@@ -12,7 +12,7 @@ import math
 from functools import cache
 from typing import Any
 
-from envs.adapted import REWARD_AND_CONTROL, adapt, literal, positive, unseen
+from envs.adapted import REWARD_AND_CONTROL, adapt, literal, split_options, unseen
 from envs.core import Environment
 from envs.failures import failure
 from envs.names import did_you_mean, nearest
@@ -66,17 +66,13 @@ def make(
         if name not in known:
             raise ValueError(f"Brax has no {name!r}; it has {', '.join(known)}{did_you_mean(nearest(name, known))}")
         own = [each for each in inspect.signature(theirs._envs[name]).parameters if each != "kwargs"]
-        allowed = ["objectives", "time_limit", "backend", "n_frames", *own]
-        unknown = [option for option in options if option not in allowed]
-        if unknown:
-            raise ValueError(f"there is no option {', '.join(unknown)}; known: {', '.join(dict.fromkeys(allowed))}")
+        kept, wrong = split_options(options, ("backend", "n_frames", *own))
         try:
-            environment = _loaded(name, **options)
-            seconds = float(environment.dt)
+            environment = _loaded(name, **kept)
         except Exception as error:
-            raise ValueError(f"Brax refuses it: {failure(error)}") from error
-    limit = positive("time_limit", time_limit)
-    return adapt(f"brax:{name}", "Brax", environment, objectives, GROUPS.get(name, REWARD_AND_CONTROL), limit, seconds)
+            raise ValueError("; ".join([*wrong, f"Brax refuses it: {failure(error)}"])) from error
+    default = GROUPS.get(name, REWARD_AND_CONTROL)
+    return adapt(f"brax:{name}", "Brax", environment, objectives, default, time_limit, wrong)
 
 
 @cache  # so that the states that episodes start from are computed once

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from envs.adapted import REWARD_AND_CONTROL, adapt, literal, positive, unseen
+from envs.adapted import REWARD_AND_CONTROL, adapt, literal, split_options, unseen
 from envs.core import Environment
 from envs.failures import failure
 from envs.names import did_you_mean, nearest
@@ -36,20 +36,18 @@ def make(
             near = did_you_mean(nearest(name, registry.ALL_ENVS))
             raise ValueError(f"MuJoCo Playground has no {name!r}; it has {', '.join(sorted(registry.ALL_ENVS))}{near}")
         config = registry.get_default_config(name)
-        theirs = [option for option in config if option not in OURS]
-        unknown = [option for option in options if option not in theirs]
-        if unknown:
-            allowed = ", ".join(("objectives", "time_limit", *theirs))
-            raise ValueError(f"there is no option {', '.join(unknown)}; known: {allowed}")
+        kept, wrong = split_options(options, [option for option in config if option not in OURS])
         try:
-            environment = _loaded(name, **options)
+            environment = _loaded(name, **kept)
         except Exception as error:
             robots = name not in dm_control_suite.ALL_ENVS
             advice = "; its robots are downloaded when one is made first, which needs a network, once" if robots else ""
-            raise ValueError(f"MuJoCo Playground refuses it: {failure(error)}{advice}") from error
-    limit = positive("time_limit", config.episode_length if time_limit is None else time_limit)
-    default = _groups(name, config)
-    return adapt(f"playground:{name}", "MuJoCo Playground", environment, objectives, default, limit, environment.dt)
+            refusal = f"MuJoCo Playground refuses it: {failure(error)}{advice}"
+            raise ValueError("; ".join([*wrong, refusal])) from error
+    limit = config.episode_length if time_limit is None else time_limit
+    return adapt(
+        f"playground:{name}", "MuJoCo Playground", environment, objectives, _groups(name, config), limit, wrong
+    )
 
 
 @cache  # so that the states that episodes start from are computed once

@@ -27,6 +27,7 @@ class Cart:
     """Writes into the dictionaries that it is given, counts in Python's numbers, and keeps a key: as theirs do."""
 
     action_size = 1
+    dt = 0.1
 
     def reset(self, rng):
         rng, place_key = jax.random.split(rng)
@@ -47,7 +48,7 @@ DEFAULT = (("near:near", "-m·steps", 0.0), ("effort:0.5*effort", "-N²·steps",
 
 
 def cart(written=None, theirs=None):
-    return adapt("library:cart", "A library", theirs or Cart(), written, DEFAULT, 7, 0.1)
+    return adapt("library:cart", "A library", theirs or Cart(), written, DEFAULT, 7, [])
 
 
 def stepped(environment, actions):
@@ -127,17 +128,19 @@ def test_terms_with_a_slash_can_be_written_and_ours_are_not_hidden():
 def test_what_makes_no_sense_is_refused():
     with pytest.raises(ValueError, match="'0[*]near' has a term without a name or a factor"):
         cart("0*near/effort")
-    with pytest.raises(ValueError, match="is no text; write objectives="):
+    with pytest.raises(ValueError, match="there is one objective; write objectives="):
         cart(("near", "effort"))
-    with pytest.raises(ValueError, match="a step must take some time"):
-        adapt("library:cart", "A library", Cart(), None, DEFAULT, 7, 0.0)
+    still = Cart()
+    still.dt = 0.0
+    with pytest.raises(ValueError, match="earlier; a step must take some time.*; time_limit must be a whole number"):
+        adapt("library:cart", "A library", still, None, DEFAULT, 0, ["earlier"])
 
 
 def test_all_that_is_wrong_with_groups_is_named_at_once():
     with pytest.raises(ValueError) as error:
         cart("a:nea+x*effort/a:place/:effort/near+")
     said = str(error.value)
-    assert said.endswith("The terms there are: effort, near, place, reward, control")
+    assert said.endswith("the terms there are: effort, near, place, reward, control")
     assert "there is no term 'nea'; did you mean 'near'?" in said
     assert "'a:nea+x*effort' has a term without a name or a factor" in said
     assert "two objectives are called 'a'" in said

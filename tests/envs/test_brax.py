@@ -27,11 +27,14 @@ SMALL += ["--ppo.environments", "4", "--ppo.rollout-steps", "64", "--evaluation.
             "brax:halfcheetah,objectives=reward_ctr/x",
             "no term 'reward_ctr'; did you mean 'reward_ctrl'.*'x'.*reward_run",
         ),
-        ("brax:ant,colour=red", "there is no option colour; known: objectives, time_limit, backend, .*healthy_reward"),
+        (
+            "brax:ant,colour=red",
+            "there is no option 'colour'; the options there are: objectives, time_limit, backend, .*healthy_reward",
+        ),
         ("brax:ant,backend=magic", "Brax refuses it: ValueError: backend should be in"),
         ("brax:ant,time_limit=0", "time_limit must be a whole number above zero, not '0'"),
-        ("brax:ant,name=x", "there is no option name; known"),
-        ("brax:ant,healthy_z_range=(0.2,1.0),colour=red", "there is no option colour"),
+        ("brax:ant,name=x", "there is no option 'name'.*; the options"),
+        ("brax:ant,healthy_z_range=(0.2,1.0),colour=red", "there is no option 'colour'"),
         ("brax:reacher,n_frames=0", "a step must take some time"),
         ("brax:fast", "Brax has no 'fast'"),
         ("brax:", "Brax has no ''; it has ant"),
@@ -40,6 +43,18 @@ SMALL += ["--ppo.environments", "4", "--ppo.rollout-steps", "64", "--evaluation.
 def test_what_is_wrong_is_named(id, message):
     with pytest.raises(ValueError, match=message):
         envs.make(id)
+
+
+def test_all_that_is_wrong_is_named_at_once():
+    with pytest.raises(ValueError) as error:
+        envs.make("brax:ant,backnd=spring,colour=red,time_limit=0,objectives=reward_ctr/reward_forward")
+    for said in (
+        "'backnd'; did you mean 'backend'?",
+        "no option 'colour'",
+        "time_limit must be",
+        "no term 'reward_ctr'",
+    ):
+        assert said in str(error.value)
 
 
 def test_an_environment_is_made_once_and_takes_options_of_theirs():

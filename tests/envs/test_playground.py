@@ -15,9 +15,15 @@ pytest.importorskip("mujoco_playground")
     ("id", "message"),
     [
         ("playground:cheetah-run", "Playground has no 'cheetah-run'; it has AcrobotSwingup, .*mean 'CheetahRun'?"),
-        ("playground:CheetahRun,colour=red", "there is no option colour; known: objectives, time_limit, .*sim_dt"),
-        ("playground:WalkerWalk,objectives=walk/control", "no term 'walk'.*The terms there are: move, stand, standing"),
-        ("playground:PointMass,episode_length=50", "there is no option episode_length; known: objectives, time_limit"),
+        (
+            "playground:CheetahRun,colour=red",
+            "there is no option 'colour'; the options there are: objectives, time_limit, .*sim_dt",
+        ),
+        ("playground:WalkerWalk,objectives=walk/control", "no term 'walk'.*the terms there are: move, stand, standing"),
+        (
+            "playground:PointMass,episode_length=50",
+            "there is no option 'episode_length'; the options there are: objectives, time_limit",
+        ),
         ("playground:PointMass,time_limit=", "time_limit must be a whole number above zero, not ''"),
         ("playground:PointMass,sim_dt=fast", "Playground refuses it: "),
     ],

@@ -17,6 +17,8 @@ README = Path(__file__).parents[2] / "README.md"
 def test_an_unknown_environment_names_the_known_ones():
     with pytest.raises(ValueError, match="unknown environment 'mo-nowhere-v0'; known: .*mo-mountaincarcontinuous-v0"):
         envs.make("mo-nowhere-v0")
+    with pytest.raises(ValueError, match="unknown environment 'brax'; known: .*, brax:NAME, playground:NAME"):
+        envs.make("brax")
 
 
 def test_a_module_that_is_not_there_is_named():
