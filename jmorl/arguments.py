@@ -1,6 +1,7 @@
 """What the command line takes: commands, their arguments, and a flag for every setting."""
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
@@ -9,6 +10,7 @@ from envs.names import did_you_mean, nearest
 from jmorl.config import Config
 from jmorl.display.characters import to_path, unicode_argument
 from jmorl.presets import PRESETS
+from jmorl.search.policy import Blend
 from jmorl.settings import Section
 
 SETTING = "setting."  # marks the parsed options that are fields of the config
@@ -87,6 +89,13 @@ def parser() -> argparse.ArgumentParser:
     play.add_argument("--steps", type=_count, help="at most so many (default: the whole episode)")
     play.add_argument("--size", type=_size, metavar="PIXELS", help="width (default: 640, for a strip 1280)")
     play.add_argument("--force", action="store_true", help="overwrite the file")
+
+    blend = commands.add_parser(
+        "blend", help="make the front of a run that has ended denser, by blends of its policies, without training"
+    )
+    blend.add_argument("run", type=to_path, metavar="RUN", help="run folder")
+    blend.add_argument("--blends", type=_count, metavar="N", help="that may join the front (default: 4 for each agent)")
+    blend.add_argument("--json", action="store_true", help="print families and blends as JSON")
 
     show = commands.add_parser("show", help="print a run's tables and draw its plots")
     show.add_argument("run", type=to_path, metavar="RUN", help="run folder")
@@ -193,7 +202,14 @@ def _add_continuing(commands: Any) -> None:
 
     export = commands.add_parser("export", help="copy a policy of a run to a file of its own")
     export.add_argument("run", type=to_path, metavar="RUN", help="run folder")
-    export.add_argument("--policy", type=_id, metavar="ID", help="default: the run's choice")
+    which = export.add_mutually_exclusive_group()
+    which.add_argument("--policy", type=_id, metavar="ID", help="default: the run's choice")
+    which.add_argument(
+        "--blend",
+        type=_shares,
+        metavar="ID:SHARE,...",
+        help="a blend of policies, scored anew: 12:0.4,15:0.6 between two, 12:1.5,15:-0.5 beyond 12, away from 15",
+    )
     export.add_argument("--to", type=to_path, required=True, metavar="FILE", help="a NumPy archive, .npz")
     export.add_argument("--force", action="store_true", help="overwrite the file")
 
@@ -278,6 +294,20 @@ def _items(text: str) -> list[str]:
     if unknown:
         raise argparse.ArgumentTypeError(f"unknown {', '.join(unknown)}; known: {', '.join(PAPER_ITEMS)}")
     return items
+
+
+def _shares(text: str) -> Blend:
+    """Return what `12:0.4,15:0.6` says; shares need not add up to one."""
+    pairs = [part.partition(":") for part in text.split(",")]
+    try:
+        shares = {_id(policy): float(share) for policy, _, share in pairs}
+    except (ValueError, argparse.ArgumentTypeError):
+        shares = {}
+    total = sum(shares.values())
+    if len(shares) < len(pairs) or not (0 < total < math.inf):
+        form = "is written as 12:0.4,15:0.6, each id once, with shares that add up to more than 0"
+        raise argparse.ArgumentTypeError(f"{form}, not {text!r}")
+    return Blend(tuple(sorted(shares)), tuple(shares[each] / total for each in sorted(shares)))
 
 
 def _seeds(text: str) -> tuple[int, ...]:

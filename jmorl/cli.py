@@ -325,20 +325,44 @@ def _play(options: argparse.Namespace) -> None:
 
     from jmorl.playback import record
     from jmorl.report.playback import check_playback, write_playback
-    from jmorl.storage.policy_file import load_policy, policy_path
+    from jmorl.storage.policy_file import load_policy, policy_name, policy_path
 
     check_playback(options.out, options.force)
     policy = load_policy(policy_path(options.policy, options.id))
     recording = record(policy, jax.random.split(jax.random.key(options.seed), 1)[0], options.steps)
     write_playback(recording, options.out, options.size)
-    print(f"{options.out}: {recording.steps} steps of policy {policy.header['id']}")
+    print(f"{options.out}: {recording.steps} steps of {policy_name(policy.header)}")
 
 
 def _export(options: argparse.Namespace) -> None:
-    from jmorl.storage.policy_file import export_policy
+    from jmorl.report.tables import scores_in_words
+    from jmorl.storage.policy_file import export_policy, policy_name
 
-    policy = export_policy(options.run, options.policy, options.to, options.force)
-    print(f"{options.to}: policy {policy.header['id']}")
+    if options.blend:
+        from jmorl.evaluation import export_blend
+
+        policy = export_blend(options.run, options.blend, options.to, options.force)
+    else:
+        policy = export_policy(options.run, options.policy, options.to, options.force)
+    print(f"{options.to}: {policy_name(policy.header)}, {scores_in_words(policy.header)}")
+
+
+def _blend(options: argparse.Namespace) -> None:
+    from jmorl.display.console import PlainConsole
+    from jmorl.report.blending_tables import blending_tables
+    from jmorl.report.watchers import blending_fields
+    from jmorl.storage.resume import blend
+    from jmorl.storage.stored_run import read_run
+
+    event = blend(options.run, options.blends)
+    stored = read_run(options.run)
+    _draw(stored)
+    if options.json:
+        print(json.dumps(blending_fields(event.blending)))
+        return
+    console = PlainConsole()
+    for table in blending_tables(event, stored.objectives):
+        console.print(table)
 
 
 def _enautilus(options: argparse.Namespace) -> None:
@@ -429,13 +453,15 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "evaluate": _evaluate,
     "play": _play,
     "export": _export,
+    "blend": _blend,
     "enautilus": _enautilus,
     "paper": _paper,
     "study": _study,
     "envs": _envs,
 }
 
-COMPUTING = ("train", "resume", "branch", "studio", "evaluate", "play", "paper", "study")  # these need JAX's devices
+# These need JAX's devices.
+COMPUTING = ("train", "resume", "branch", "studio", "evaluate", "play", "blend", "export", "paper", "study")
 
 
 if __name__ == "__main__":

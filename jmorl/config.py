@@ -150,6 +150,13 @@ class Config(Section):
                 raise ValueError(f"{steps} steps end within the warm-up; a first generation starts at {least}")
         return steps
 
+    @field_validator("search")
+    @classmethod
+    def _blends_in_raw_units(cls, search: SearchConfig, info: ValidationInfo) -> SearchConfig:
+        if search.final_blends and "evaluation" in info.data and info.data["evaluation"].units == "paper":
+            raise ValueError("final_blends must be 0 in paper units: scores are never made anew there, but blends' are")
+        return search
+
     @field_validator("reference_point")
     @classmethod
     def _one_per_objective(cls, point: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:

@@ -53,6 +53,7 @@ BASELINE: Mapping[str, Any] = {
     "search.least_within": 0,
     "search.outside_share": 0.0,
     "search.optimism": 0.0,
+    "search.final_blends": 0,
     "search.gain_within": "bounds",
     "search.value_scale": "range",
     "search.sparsity_weight": 1.0,
@@ -73,6 +74,7 @@ ADDED_SINCE_FORMAT_1 = frozenset(
         "search.least_within",
         "search.outside_share",
         "search.optimism",
+        "search.final_blends",
     }
 )
 WITHOUT_EFFECT = frozenset({"checkpoints.keep"})  # on results

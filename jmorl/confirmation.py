@@ -9,15 +9,18 @@ Letters: P agents, N policies, M objectives.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from statistics import NormalDist
+from typing import TypeVar
 
 import jax
 import numpy as np
 
 from jmorl.learning.population import Population
 from jmorl.scoring import raw_scores
+from jmorl.search.pareto import farthest_first
 from jmorl.search.policy import Confirmation, Policy, values_of
 from jmorl.search.scaling import core_scale
 
+T = TypeVar("T")
 FINALISTS = 4  # times P: as many policies are confirmed before the last question, at most
 CONFIDENCE = 0.99  # that the error of a confirmed score covers the mean of all starts, in each objective
 
@@ -38,11 +41,8 @@ def finalists(front: Sequence[Policy], choice: Policy | None, agents: int) -> li
     scale = core_scale(values)
     scaled = scale.apply(values)
     order = np.argsort(np.linalg.norm(scaled - scale.apply(choice.values), axis=1), kind="stable")
-    taken = order[: most // 2].tolist()
-    while len(taken) < most:
-        distances = np.linalg.norm(scaled[:, None] - scaled[taken], axis=2).min(axis=1)
-        distances[taken] = -1.0
-        taken.append(int(distances.argmax()))
+    nearest = order[: most // 2].tolist()
+    taken = {*nearest, *farthest_first(scaled, scaled[nearest], most - len(nearest))}
     return [policy for index, policy in enumerate(front) if index in taken]
 
 
@@ -56,7 +56,7 @@ def confirmed(
     rounds = -(-episodes // at_once)
     found: list[Policy] = []
     steps = 0
-    for some in _batches(policies, population.size):
+    for some in batches(policies, population.size):
         train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(policy.snapshot for policy in some))
         returns = []
         for number in range(rounds):
@@ -68,10 +68,10 @@ def confirmed(
     return found[: len(policies)], steps
 
 
-def _batches(policies: Sequence[Policy], size: int) -> Iterator[list[Policy]]:
-    """Yield P policies at a time; the last ones filled up with the first of them."""
-    for start in range(0, len(policies), size):
-        some = list(policies[start : start + size])
+def batches(each: Sequence[T], size: int) -> Iterator[list[T]]:
+    """Yield so many at a time; the last ones filled up with the first of them."""
+    for start in range(0, len(each), size):
+        some = list(each[start : start + size])
         yield some + some[:1] * (size - len(some))
 
 

@@ -1,5 +1,7 @@
-"""A stored policy on fresh episodes: in its own environment, and in MO-Gymnasium's."""
+"""Stored policies, and blends of them, on fresh episodes: in their own environment, and in MO-Gymnasium's."""
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -10,7 +12,20 @@ import envs
 from envs.mujoco_model import quiet_mujoco
 from jmorl.learning.execution import result_of
 from jmorl.learning.rollout import EpisodeReturns, episode_returns
-from jmorl.storage.policy_file import StoredPolicy, policy_environment
+from jmorl.search.policy import Blend
+from jmorl.storage.blend_file import mix
+from jmorl.storage.policy_file import (
+    PolicyFileError,
+    StoredPolicy,
+    check_target,
+    load_policy,
+    policy_environment,
+    policy_path,
+    write_stored_policy,
+)
+
+BLEND_EPISODES = 100  # that score a blend
+BLEND_SEED = 2**32 - 1  # of their starts: not the one that `jmorl evaluate` has by default
 
 
 class NotInGymnasium(ValueError):
@@ -31,6 +46,32 @@ def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
 
     returns: EpisodeReturns = result_of(jax.jit(jax.vmap(episode)), keys)
     return returns
+
+
+def export_blend(place: Path, blend: Blend, target: Path, force: bool = False) -> StoredPolicy:
+    """Mix policies of the run in a folder, score the blend by fresh episodes, and write it to a file.
+
+    Raises PolicyFileError, and ComputationFailed.
+    """
+    check_target(target, force)
+    mixture = mix([load_policy(policy_path(place, parent)) for parent in blend.parents], blend)
+    returns = evaluate_stored(mixture, jax.random.split(jax.random.key(BLEND_SEED), BLEND_EPISODES))
+    undiscounted = np.asarray(returns.undiscounted, np.float64)
+    if not np.isfinite(undiscounted).all():
+        raise PolicyFileError(f"the blend {blend} has returns that are not finite")
+    scores = {
+        "values": undiscounted.mean(axis=0).tolist(),
+        "score": undiscounted.mean(axis=0).tolist(),
+        "std": undiscounted.std(axis=0).tolist(),
+        "discounted": np.asarray(returns.discounted, np.float64).mean(axis=0).tolist(),
+        "evaluation_episodes": BLEND_EPISODES,
+    }
+    mixture = replace(mixture, header=mixture.header | scores)
+    try:
+        write_stored_policy(target, mixture)
+    except OSError as error:
+        raise PolicyFileError(f"{target} cannot be written: {error.strerror}") from error
+    return mixture
 
 
 def evaluate_in_gymnasium(policy: StoredPolicy, episodes: int, seed: int) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from jmorl.decision.protocol import AnyQuestion
+from jmorl.search.families import Blending
 from jmorl.search.metrics import FrontMetrics
 from jmorl.search.policy import Policy
 from jmorl.state import RunState
@@ -68,12 +69,21 @@ class GenerationFinished:
     steps: int  # environment steps used for learning so far
     seconds: Seconds
     steps_per_second: float  # of this generation, selection and evaluation included
-    training: Mapping[str, float]  # losses, entropy and KL divergence of the last iteration, means over the agents
+    # Losses, entropy and KL divergence of the last iteration, means over the agents; None where nothing was trained.
+    training: Mapping[str, float | None]
     front: FrontMetrics
     utility_max: float | None  # of the archive; None for a decision maker without a utility
     search: Mapping[str, float | None]  # the method's own metrics
     bounds: np.ndarray  # [M] in force
     generations_to_question: int | None  # that end before the next question; None: there is none before the end
+
+
+@dataclass(frozen=True)
+class Blended(GenerationFinished):
+    """A generation that trained nothing: its offspring are blends that joined the front, with confirmed scores."""
+
+    blending: Blending
+    before: FrontMetrics
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ the command line, the run folder, a page, reads the same events. What is particu
 """
 
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
@@ -16,19 +16,21 @@ import numpy as np
 import envs
 from envs.checks import check_same
 from envs.core import Environment
+from jmorl.blending import blend_front
 from jmorl.config import Config
 from jmorl.confirmation import confirmed, finalists
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
 from jmorl.decision.remembered import RunRecord
 from jmorl.decision.stand_in import StandIn
 from jmorl.decision.users import make_user
-from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
+from jmorl.events import Blended, Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
 from jmorl.learning.execution import own_settings
-from jmorl.learning.moppo import TrainState
+from jmorl.learning.moppo import Diagnostics, TrainState
 from jmorl.learning.population import Population
 from jmorl.methods import registry
 from jmorl.methods.base import Method, Problem, Tasks, checked_tasks
 from jmorl.scoring import Scores, paper_scores, raw_scores
+from jmorl.search.bounds import members_within
 from jmorl.search.metrics import front_metrics
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.scaling import REFERENCE_MARGIN, range_scale
@@ -159,6 +161,10 @@ class _Run:
             state = finished.state
         satisfied = self._satisfied(state)
         # What satisfies may lie outside the bounds: the search is not the only one that finds things.
+        if not satisfied and self._blends_at_the_end(state):
+            finished = self.blended(state, self._to_be_blended(state), self.config.search.final_blends)
+            yield finished
+            state = finished.state
         front = state.archive.members if satisfied else self.method.final_front(state)
         best = finalists(front, None if satisfied else state.choice, self.population.size)
         state, best = self._confirmed(state, best)
@@ -192,6 +198,37 @@ class _Run:
         train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(parent.snapshot for parent in tasks.parents))
         iterations = self.config.population.iterations
         return self._trained(state, train_states, tasks.weights, iterations, tasks, select_seconds)
+
+    def blended(self, state: RunState, front: Sequence[Policy], most: int) -> Blended:
+        """Make a front denser by at most so many blends: a generation of its own."""
+        started = time.perf_counter()
+        before = front_metrics(state.archive.values, reference_point(state), self.metric_weights)
+        state = replace(state, generation=state.generation + 1, blendings=state.blendings + 1)
+        blending = blend_front(
+            front,
+            self.population,
+            evaluation_keys(self.config, state.policies),
+            _confirmation_key(self.config),
+            self.config.evaluation.confirmation_episodes,
+            most,
+            state.generation,
+            state.policies,
+        )
+        blends, in_force = blending.blends, self.method.bounds(state.search)
+        state = replace(state, archive=state.archive.offer(blends), policies=state.policies + len(blends))
+        state = replace(state, evaluation_steps=state.evaluation_steps + blending.evaluation_steps)
+        seconds = Seconds(evaluate=time.perf_counter() - started)
+        nothing = dict.fromkeys(Diagnostics.names())
+        finished = self._finished(state, blends, None, seconds, 0, nothing, in_force)
+        return Blended(**vars(finished), blending=blending, before=before)
+
+    def _blends_at_the_end(self, state: RunState) -> bool:
+        return self.config.search.final_blends > 0 and state.blendings == 0 and len(state.archive.members) > 1
+
+    def _to_be_blended(self, state: RunState) -> Sequence[Policy]:
+        """Return the front within the bounds, where it is more than one policy; else the whole front."""
+        inside = members_within(state.archive.members, self.method.bounds(state.search))
+        return inside if len(inside) > 1 else state.archive.members
 
     def _decided(self, state: RunState, question: AnyQuestion) -> Generator[Decided, None, tuple[RunState, Decided]]:
         """Put a question to the decision maker, and what may follow from the answer. Yields an event for each."""
@@ -275,6 +312,19 @@ class _Run:
         evaluated = time.perf_counter()
         state = replace(state, iterations=state.iterations + iterations)
         seconds = Seconds(select_seconds, trained - started, evaluated - trained)
+        return self._finished(state, offspring, tasks, seconds, iterations, diagnostics.means(), in_force)
+
+    def _finished(
+        self,
+        state: RunState,
+        offspring: tuple[Policy, ...],
+        tasks: Tasks | None,
+        seconds: Seconds,
+        iterations: int,
+        training: Mapping[str, float | None],
+        in_force: np.ndarray,
+    ) -> GenerationFinished:
+        """Return the event of a generation."""
         utilities = self.decision_maker.utility(state.archive.values)
         return GenerationFinished(
             state,
@@ -283,7 +333,7 @@ class _Run:
             self._steps(state),
             seconds,
             iterations * self.config.steps_per_iteration / seconds.total,
-            diagnostics.means(),
+            training,
             front_metrics(state.archive.values, reference_point(state), self.metric_weights),
             None if utilities is None else float(utilities.max()),
             self.method.metrics(state, self.decision_maker.utility, offspring, tasks),
@@ -312,6 +362,25 @@ class _Run:
         if self.config.reference_point:
             return np.array(self.config.reference_point)
         return range_scale(values_of(warmed_up)).invert(np.array(-REFERENCE_MARGIN))
+
+
+def blend(
+    config: Config,
+    environment: Environment[Any],
+    state: RunState,
+    most: int,
+    decision_maker: DecisionMaker | None = None,
+    population: Population | None = None,
+) -> Blended:
+    """Make the whole front of a run's state denser by at most so many blends.
+
+    The environment is the config's; the decision maker, who is not asked, tells utilities. Scores are in raw units.
+    Raises TrainingFault.
+    """
+    maker = decision_maker or make_user(config.user, environment.objectives)
+    run = _Run(config, environment, maker, population or Population(environment, config.learning), nullcontext)
+    run.population.compile()
+    return run.blended(state, state.archive.members, most)
 
 
 def _policies(

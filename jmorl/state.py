@@ -23,6 +23,7 @@ class RunState:
     iterations: int = 0  # PPO iterations of every agent so far
     evaluation_steps: int = 0
     policies: int = 0  # evaluated so far: the id of the next one
+    blendings: int = 0  # generations among them that blended the front, and trained nothing
     questions: int = 0
     policies_shown: int = 0
 

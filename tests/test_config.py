@@ -60,6 +60,7 @@ OTHER = {
     "search.least_within": 4,
     "search.outside_share": 0.5,
     "search.optimism": 0.5,
+    "search.final_blends": 4,
     "search.bounds_scale": "one",
     "search.gain_within": "front",
     "search.value_scale": "none",

@@ -42,16 +42,22 @@ def front_table(
     table = PlainTable("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
-        notes = {policy.id == previous_id: "last choice", policy.id == chosen_id: "chosen"}
+        role = {policy.id == previous_id: "last choice", policy.id == chosen_id: "chosen"}.get(True)
+        notes = role, _origin(policy), _outside(bool(bounded[index]), bool(good[index]))
         table.add_row(
             str(policy.id),
             *(column[index] for column in scores),
             " ".join(f"{weight:.2g}" for weight in policy.weights),
             str(policy.generation),
-            ", ".join(filter(None, [notes.get(True), _outside(bool(bounded[index]), bool(good[index]))])),
+            ", ".join(filter(None, notes)),
             style="bold" if policy.id == chosen_id else None if bounded[index] and good[index] else "dim",
         )
     return table
+
+
+def _origin(policy: Policy) -> str:
+    """Say what a blend is of."""
+    return f"blend {policy.blend}" if policy.blend else ""
 
 
 def _outside(bounded: bool, good: bool) -> str:

@@ -80,9 +80,14 @@ class Diagnostics(NamedTuple):
     fault_component: jax.Array  # [] int32, the first of the observation or reward; meaningless of other faults
     fault_iteration: jax.Array  # [] int32, from 1; meaningless without a fault
 
+    @classmethod
+    def names(cls) -> list[str]:
+        """Return the names of the numbers that have a mean."""
+        return [name for name in cls._fields if not name.startswith("fault")]
+
     def means(self) -> dict[str, float]:
         """Return the numbers of a population [P], averaged over its agents."""
-        return {name: float(getattr(self, name).mean()) for name in self._fields if not name.startswith("fault")}
+        return {name: float(getattr(self, name).mean()) for name in self.names()}
 
     def cause(self, agent: int, objectives: Sequence[Objective]) -> str:
         """Name the number that stopped being finite for an agent: `observation[3]`, `reward of energy`, or `loss`."""

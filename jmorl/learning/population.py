@@ -65,7 +65,7 @@ class Population:
 
         Raises TrainingFault, naming agents and objectives, if a return is not finite.
         """
-        returns = self._evaluate(train_states, keys)
+        returns = self.try_out(train_states, keys)
         faulty = ~np.isfinite(np.asarray(returns.undiscounted)).all(axis=1)  # [P, M]
         if faulty.any():
             names = [objective.name for objective in self.objectives]
@@ -77,6 +77,10 @@ class Population:
                 )
             )
         return returns
+
+    def try_out(self, train_states: TrainState, keys: jax.Array) -> EpisodeReturns:
+        """Score every agent as `evaluate` does, also where a return is not finite."""
+        return self._evaluate(train_states, keys)
 
     def _train(
         self, train_states: TrainState, weights: np.ndarray, keys: jax.Array, schedule: Schedule

@@ -16,6 +16,7 @@ from envs.drawing import Capsule, Disk, Label, Point, Polygon, Polyline, Scene, 
 from jmorl.display.text import number_format, objective_label
 from jmorl.playback import Recording
 from jmorl.report.style import BLUE, GREY, INK, ORANGE, RED
+from jmorl.storage.policy_file import policy_name
 
 OVERSAMPLING = 4  # shapes are drawn so many times larger, and their edges averaged
 COLOURS = {  # of the parts; the limbs differ in lightness, too
@@ -141,7 +142,7 @@ def _pose(recording: Recording, step: int, width: int, size: float) -> Image.Ima
 
 def _title(recording: Recording) -> str:
     header = recording.policy.header
-    return f"{header['environment']}, policy {header['id']}"
+    return f"{header['environment']}, {policy_name(header)}"
 
 
 def _time(recording: Recording, step: int) -> str:

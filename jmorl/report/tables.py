@@ -17,6 +17,7 @@ from jmorl.display.text import (
     REASONS,
     confirmed_in_words,
     duration,
+    number,
     number_format,
     objective_label,
     plural,
@@ -26,6 +27,7 @@ from jmorl.learning.rollout import EpisodeReturns
 from jmorl.search.metrics import coverage
 from jmorl.search.policy import values_of
 from jmorl.search.prediction import COVERAGE
+from jmorl.storage.policy_file import policy_name
 from jmorl.storage.stored_run import StoredRun
 
 
@@ -119,7 +121,7 @@ def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Plai
     undiscounted = np.asarray(returns.undiscounted, float)
     spread = "std.\nerror", "std.\ndev.", "\nworst", "\nbest"
     table = PlainTable("\nobjective", "\nmean", *spread, "in its\nrun", "dis-\ncounted", words=["\nobjective"])
-    table.title = f"Policy {header['id']} in {plural(len(undiscounted), 'fresh episode')} of {header['environment']}"
+    table.title = f"{_title(header)} in {plural(len(undiscounted), 'fresh episode')} of {header['environment']}"
     for index, fields in enumerate(header["objectives"]):
         column = undiscounted[:, index]
         fmt = number_format(column)
@@ -133,12 +135,25 @@ def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Plai
     return table
 
 
+def scores_in_words(header: Mapping[str, Any]) -> str:
+    """Return the scores of a stored policy with this header: `time -66.1, fuel -57.3`."""
+    return ", ".join(
+        f"{objective['label']} {number(value)}"
+        for objective, value in zip(header["objectives"], header["values"], strict=True)
+    )
+
+
+def _title(header: Mapping[str, Any]) -> str:
+    name = policy_name(header)
+    return name[0].upper() + name[1:]
+
+
 def comparison_table(header: Mapping[str, Any], ours: np.ndarray, theirs: np.ndarray, z: np.ndarray) -> PlainTable:
     """Return the returns [N, M] here and in MO-Gymnasium, side by side; `z` [M] is their difference in std. errors."""
     spread = "std.\ndev.", "std.\nerror"
     headings = "jmorl\nmean", *spread, "MO-Gym.\nmean", *spread, "difference in\nstd. errors"
     table = PlainTable("\nobjective", *headings, words=["\nobjective"])
-    table.title = f"Policy {header['id']} in {header['environment']}, {plural(len(ours), 'fresh episode')} each"
+    table.title = f"{_title(header)} in {header['environment']}, {plural(len(ours), 'fresh episode')} each"
     for index, fields in enumerate(header["objectives"]):
         cells = [cell for returns in (ours, theirs) for cell in _mean_and_errors(returns[:, index])]
         table.add_row(objective_label(Objective(**fields)), *cells, *_texts(z[index : index + 1], "+.1f"))

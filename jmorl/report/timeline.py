@@ -6,7 +6,7 @@ from typing import Literal
 from jmorl.config import Config
 from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 
-Phase = Literal["compiling", "warm-up", "generation", "question", "finished"]
+Phase = Literal["compiling", "warm-up", "generation", "blending", "question", "finished"]
 
 
 @dataclass(frozen=True)
@@ -105,5 +105,8 @@ class Timeline:
     def _next(self, event: GenerationFinished | Resumed) -> "Timeline":
         """Return the timeline after a generation has ended."""
         generation, silent = event.state.generation + 1, event.generations_to_question
-        phase: Phase = "question" if silent == 0 or generation > self.generations else "generation"
+        over = generation > self.generations
+        phase: Phase = "question" if silent == 0 or over else "generation"
+        if over and self.config.search.final_blends and not event.state.blendings:
+            phase = "blending"
         return replace(self, phase=phase, generation=generation, silent=silent)

@@ -24,8 +24,9 @@ from jmorl.display.text import (
     short_count,
     values_in_words,
 )
-from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
+from jmorl.events import Blended, Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
+from jmorl.search.families import Blending
 from jmorl.search.policy import Confirmation, Policy
 
 
@@ -84,6 +85,8 @@ class Lines(Watcher):
             case Resumed():
                 front = len(event.state.archive.members)
                 return f"resumed after {self._name(event.state.generation)}, with a front of {front}"
+            case Blended():
+                return self._blending_line(event)
             case GenerationFinished():
                 return self._generation_line(event)
             case Decided():
@@ -113,6 +116,15 @@ class Lines(Watcher):
             times = f"select {duration(seconds.select)}, {times}"
         return f"{self._name(generation)}: {', '.join(facts)} ({times})"
 
+    def _blending_line(self, event: Blended) -> str:
+        blending, front = event.blending, event.front
+        facts = [
+            f"{len(blending.blends)} of {plural(blending.tried, 'blend')} joined the front, now of {front.front_size}",
+            f"hypervolume {number(event.before.hypervolume)}, now {number(front.hypervolume)}",
+            plural(len(blending.families), "family"),
+        ]
+        return f"blending: {', '.join(facts)} (evaluate {duration(event.seconds.total)})"
+
     def _name(self, generation: int) -> str:
         return f"generation {generation} of {self.generations}" if generation else "warm-up"
 
@@ -131,13 +143,17 @@ class Json(Watcher):
          "utility_mean_within_bounds", "prediction_error", "realized_change", "interval_coverage",
          "widenings" (interactive only),
          "front": [policy, ...]}
+        {"event": "blended": like "generation", and "tried": how many blends, "families": [[policy id, ...], ...],
+         "links": [{"ends": two policy ids, "values": of the blend half-way, "loss": of the range}, ...],
+         "blends": [policy, ...]: that joined the front}
         {"event": "decided", "purpose": "steer" or "final", "generation": about to start, "policy": its id, "values",
          "bounds": that follow, "shown": how many policies, the fields of the answer ("stop", "generations": before the
          next question, "stand_in": whether a stand-in answered, "reason": why), "seconds"}
         {"event": "finished", "reason": "budget", "satisfied" or "stopped", "chosen": policy}
 
     A policy is {"policy": its id, "generation", "parent", "weights", "values", "std"}. Where its values are confirmed
-    it has "confirmation_episodes", "error" (of the values, 99 of 100) and "claimed" (what the search went by).
+    it has "confirmation_episodes", "error" (of the values, 99 of 100) and "claimed" (what the search went by). A blend
+    has "blend": {"parents": ids, "coefficients"}.
     """
 
     def __init__(self, config: Config, file: TextIO):
@@ -155,6 +171,8 @@ class Json(Watcher):
                 return {"event": "compiled", **asdict(event)}
             case Resumed():
                 return {"event": "resumed", "generation": event.state.generation, "steps": event.steps}
+            case Blended():
+                return {**self._generation_fields(event), "event": "blended", **blending_fields(event.blending)}
             case GenerationFinished():
                 return self._generation_fields(event)
             case Decided():
@@ -193,6 +211,16 @@ class Json(Watcher):
             **event.search,
             "front": [_policy_fields(policy) for policy in event.state.archive.members],
         }
+
+
+def blending_fields(blending: Blending) -> dict[str, Any]:
+    """Return what came of blending a front, for JSON."""
+    return {
+        "tried": blending.tried,
+        "families": blending.families,
+        "links": [{"ends": link.ends, "values": link.values.tolist(), "loss": link.loss} for link in blending.links],
+        "blends": [_policy_fields(policy) for policy in blending.blends],
+    }
 
 
 def question_name(decided: Decided) -> str:
@@ -242,6 +270,7 @@ def _policy_fields(policy: Policy) -> dict[str, Any]:
         "policy": policy.id,
         "generation": policy.generation,
         "parent": policy.parent,
+        **({"blend": asdict(policy.blend)} if policy.blend else {}),
         "weights": policy.weights.tolist(),
         "values": policy.values.tolist(),
         "std": policy.std.tolist(),

@@ -1,4 +1,4 @@
-"""Sets of objective vectors: which are non-dominated, and how good the set is. Maximisation, any M."""
+"""Sets of objective vectors: which are non-dominated, how good the set is, what it lacks. Maximisation, any M."""
 
 import moocore
 import numpy as np
@@ -47,3 +47,17 @@ def expected_utility(values: np.ndarray, weights: np.ndarray) -> float:
     (Zintgraf et al. 2015, with the weights given instead of drawn.)
     """
     return float((values @ weights.T).max(axis=0).mean())
+
+
+def farthest_first(values: np.ndarray, taken: np.ndarray, count: int) -> list[int]:
+    """Return the indices of so many of the vectors [N, M], or of all: each is the one farthest from all before it.
+
+    Before the first one come those that are `taken` [K, M], K >= 1 (Gonzalez 1985).
+    """
+    distances = np.linalg.norm(values[:, None] - taken[None], axis=2).min(axis=1)
+    chosen: list[int] = []
+    while len(chosen) < min(count, len(values)):
+        chosen.append(int(distances.argmax()))
+        distances = np.minimum(distances, np.linalg.norm(values - values[chosen[-1]], axis=1))
+        distances[chosen] = -1.0
+    return chosen

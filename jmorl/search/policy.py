@@ -17,6 +17,18 @@ class Confirmation:
     error: np.ndarray  # [M] of it: the mean over all starts is within in 99 of 100 cases
 
 
+@dataclass(frozen=True)
+class Blend:
+    """Of which policies the parameters of a blend are an affine combination."""
+
+    parents: tuple[int, ...]  # ids, ascending
+    coefficients: tuple[float, ...]  # of each; they add up to one, and a negative one leads away from its policy
+
+    def __str__(self) -> str:
+        """Return it as it is written: `12:0.4 15:0.6`."""
+        return " ".join(f"{parent}:{share:g}" for parent, share in zip(self.parents, self.coefficients, strict=True))
+
+
 @dataclass(frozen=True, eq=False)
 class Policy:
     """Everything known of one policy, in one record, so that policy and score cannot drift apart.
@@ -27,7 +39,7 @@ class Policy:
 
     id: int
     generation: int  # 0: the warm-up
-    parent: int | None  # id of the policy whose training was continued
+    parent: int | None  # id of the policy whose training was continued; None in the warm-up, and for a blend
     weights: np.ndarray  # [M] the weights it was trained with
     values: np.ndarray  # [M] z, its score: maximised
     std: np.ndarray  # [M] standard deviation of the score over the evaluation episodes
@@ -37,6 +49,7 @@ class Policy:
     interval: np.ndarray | None = None  # [2, M] ends between which the search expected them in 80 of 100 cases
     raw: np.ndarray | None = None  # [M] mean undiscounted return, where `values` are in other units; else None
     confirmation: Confirmation | None = None  # of `values` and `std`, where they are confirmed
+    blend: Blend | None = None  # for a policy that was not trained, but mixed
 
 
 def values_of(policies: Sequence[Policy]) -> np.ndarray:  # [N, M]

@@ -40,5 +40,9 @@ class SearchConfig(Section):
     weight_divisions: Count = Field(
         10, description="steps on each edge of the grid of candidate weights; fewer where it would have over 100"
     )
+    final_blends: Annotated[int, Field(ge=0)] = Field(
+        0,
+        description="blends of policies that may join the front before the last question; 0: none (the paper)",
+    )
     buffer_bins: Annotated[int, Field(ge=1, le=10_000)] = Field(100, description="directions of the performance buffer")
     buffer_size: Count = Field(4, description="policies kept in each direction")

@@ -21,11 +21,13 @@ class CsvLog:
         self.text = ""
 
     def append(self, rows: Sequence[Row]) -> None:
-        """Add rows, at least one, after a header line if they are the first.
+        """Add rows, after a header line if they are the first.
 
         A file of another version is written anew once: with the columns of these rows, which are empty where the file
         does not have them, and behind them those that only the file has.
         """
+        if not rows:
+            return
         header = _header(self.text)
         names = list(rows[0])
         columns = [*names, *(name for name in map(current_name, header) if name not in names)]

@@ -29,6 +29,7 @@ class Layout(_Folder):
     metrics = _Inside("metrics.csv")
     policies = _Inside("policies.csv")
     front = _Inside("front.csv")
+    families = _Inside("families.json")
     decisions = _Inside("decisions.jsonl")
     policy_files = _Inside("policies")  # a folder
     checkpoints = _Inside("checkpoints")  # a folder

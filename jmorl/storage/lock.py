@@ -40,12 +40,18 @@ class RunLock:
         os.write(self._descriptor, json.dumps(holder).encode())
 
     def release(self) -> None:
-        """Let others have the folder. Where the file cannot be deleted, as on Windows, it stays, unlocked and empty."""
+        """Let others have the folder. Where the file cannot be deleted, as on Windows, it stays, unlocked and empty.
+
+        A second time it does nothing.
+        """
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor < 0:
+            return
         try:
             self.path.unlink(missing_ok=True)
         except OSError:
-            os.ftruncate(self._descriptor, 0)
-        os.close(self._descriptor)
+            os.ftruncate(descriptor, 0)
+        os.close(descriptor)
 
 
 def check_unlocked(folder: Path) -> None:

@@ -14,7 +14,8 @@ import json
 import shutil
 import zipfile
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NotRequired
@@ -28,13 +29,14 @@ from envs.actions import ActionBox
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.learning.statistics import NORMALIZED_CLIP, VARIANCE_FLOOR
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Blend, Policy
 from jmorl.storage.documents import DocumentError, check_fields, json_object
 from jmorl.storage.files import written_whole
 from jmorl.storage.layout import Layout
 from jmorl.storage.versions import NewerFormat, check_format
 
 FORMAT = 2
+_STATISTICS = "observation_mean", "observation_variance"
 INPUT = {"variance_floor": VARIANCE_FLOOR, "clip": NORMALIZED_CLIP}
 
 
@@ -55,7 +57,7 @@ class _Header(TypedDict):
     environment: str
     objectives: list[_Objective]
     action_limits: NotRequired[list[Any]]  # of the first format; later ones have the box as arrays
-    id: int
+    id: int | None  # None for a blend that no run has found
     values: list[float]
     discount: float
     network: _Network
@@ -114,6 +116,7 @@ def save_policy(
         "id": policy.id,
         "generation": policy.generation,
         "parent": policy.parent,
+        "blend": asdict(policy.blend) if policy.blend else None,
         "weights": policy.weights.tolist(),
         "values": (policy.values if policy.raw is None else policy.raw).tolist(),
         "score": policy.values.tolist(),  # other than the values only in paper units
@@ -129,8 +132,28 @@ def save_policy(
         },
     }
     box = {f"action_{name}": array for name, array in environment.action_box._asdict().items()}
+    _write(path, header, {**_network(policy), **box})
+
+
+def write_stored_policy(path: Path, policy: StoredPolicy) -> None:
+    """Write a policy that was read from a file, or made from such ones."""
+    arrays = {"log_std": policy.log_std, **{name: getattr(policy, name) for name in _STATISTICS}}
+    for index, (kernel, bias) in enumerate(policy.layers):
+        arrays |= {f"layer_{index}_kernel": kernel, f"layer_{index}_bias": bias}
+    box = {f"action_{name}": array for name, array in policy.box._asdict().items()}
+    _write(path, policy.header, {**arrays, **box})
+
+
+def _write(path: Path, header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
     with written_whole(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, header=np.array(json.dumps(header)), **_network(policy), **box)
+        np.savez(file, header=np.array(json.dumps(header)), **arrays)
+
+
+def policy_name(header: Mapping[str, Any]) -> str:
+    """Return what a policy with this header is called: `policy 12`, or `blend 12:0.4 15:0.6` for one of no run."""
+    if header["id"] is not None:
+        return f"policy {header['id']}"
+    return f"blend {Blend(*map(tuple, header['blend'].values()))}"
 
 
 def holds(path: Path, policy: Policy) -> bool:
@@ -258,13 +281,18 @@ def export_policy(place: Path, policy_id: int | None, target: Path, force: bool 
     """
     source = policy_path(place, policy_id)
     policy = load_policy(source)
-    if target.is_dir():
-        raise PolicyFileError(f"{target} is a folder; name a file")
-    if target.exists() and not force:
-        raise PolicyFileError(f"{target} exists; choose another file, or overwrite it with --force")
+    check_target(target, force)
     try:
         with written_whole(target) as temporary:
             shutil.copyfile(source, temporary)
     except OSError as error:
         raise PolicyFileError(f"{target} cannot be written: {error.strerror}") from error
     return policy
+
+
+def check_target(target: Path, force: bool) -> None:
+    """Raise PolicyFileError if a policy must not be written to a file."""
+    if target.is_dir():
+        raise PolicyFileError(f"{target} is a folder; name a file")
+    if target.exists() and not force:
+        raise PolicyFileError(f"{target} exists; choose another file, or overwrite it with --force")

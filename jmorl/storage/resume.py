@@ -1,4 +1,4 @@
-"""Going on with what a run folder holds: resuming a run, and branching off one."""
+"""Going on with what a run folder holds: resuming a run, branching off one, and blending the front of one."""
 
 import re
 import shutil
@@ -16,9 +16,10 @@ from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.decision.remembered import Remembered, by_stand_in
 from jmorl.decision.users import make_user
 from jmorl.display.commands import command
-from jmorl.events import Event
+from jmorl.events import Blended, Event
 from jmorl.learning.check import check_run
 from jmorl.learning.population import Population
+from jmorl.loop import blend as blend_state
 from jmorl.loop import make_method, run
 from jmorl.search.policy import Policy
 from jmorl.state import RunState
@@ -32,6 +33,8 @@ from jmorl.storage.policy_file import PolicyFileError, holds, load_policy
 from jmorl.storage.run_folder import RunFolder, check_free
 from jmorl.storage.stored_state import CannotContinue, Found, last_good, read_start, state_after
 from jmorl.storage.versions import NewerFormat
+
+BLENDS = 4  # for each agent, that may join a front
 
 
 class AlreadyFinished(CannotContinue):
@@ -104,6 +107,35 @@ def resume(path: Path | str, user: DecisionMaker | None = None, ask_now: bool = 
         state = _restore(folder, found, notes)
         _note_resumption(folder, state, notes)
         return Continued(folder, state, tuple(notes), user, ask_now)
+
+
+def blend(path: Path | str, most: int | None = None, population: Population | None = None) -> Blended:
+    """Make the front of a run that has ended denser by blends, and record them in its folder.
+
+    At most so many join, by default four for each agent. The run's result stays as it is. Raises CannotContinue,
+    FolderInUse, NewerFormat and NotAsDeclared, having changed nothing, and TrainingFault.
+    """
+    path = Path(path)
+    manifest, config = read_start(path)
+    if not Layout(path).result.exists():
+        raise CannotContinue(f"the run in {path} has not ended; first go on with it: {command('resume', path)}")
+    if config.evaluation.units == "paper":
+        raise CannotContinue(f"the run in {path} has scores in paper units, in which none can be made for blends")
+    environment = _environment(config)
+    _refuse_to_rescale(path, manifest, environment)
+    user = _its_user(path, config, environment)
+    with _locked(path) as lock:
+        found, notes = last_good(path, manifest, config, environment)
+        if found is None:
+            raise CannotContinue("; ".join([f"{path} has no checkpoint, which has what policies learn from", *notes]))
+        with _opened(path, config, environment, lock, manifest) as folder:
+            state = _restore(folder, found, notes)
+            assert state is not None
+            if len(state.archive.members) < 2:
+                raise CannotContinue(f"the front in {path} has one policy, and so nothing to blend it with")
+            event = blend_state(config, environment, state, most or BLENDS * config.population.agents, user, population)
+            folder.record(event)
+            return event
 
 
 def branch(
@@ -242,7 +274,10 @@ def _restore(folder: RunFolder, found: Found | None, notes: list[str]) -> RunSta
         folder.write_front(state.archive.members)
     else:
         layout.front.unlink(missing_ok=True)
-    layout.chosen.unlink(missing_ok=True)
+    if not layout.result.exists():
+        layout.chosen.unlink(missing_ok=True)
+    if not state or not state.blendings:
+        layout.families.unlink(missing_ok=True)
     for generation in later:
         remove(checkpoint_path(layout.checkpoints, generation))
     return state

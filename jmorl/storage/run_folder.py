@@ -4,9 +4,11 @@ config.toml      every setting, as resolved; `jmorl train --config` takes it
 manifest.json    versions, device, commit, command; the run that it branches off; where it was resumed
 metrics.csv      one row for each generation; 0 is the warm-up; `sigma` only in paper units
 policies.csv     one row for each evaluated policy: origin, weights, scores, what was predicted; `low` to `high` is the
-                 prediction's 80 % interval; `raw` returns only where the scores are in paper units
+                 prediction's 80 % interval; `raw` returns only where the scores are in paper units; of a `blend` which
+                 policies it is of, and how much of each
 front.csv        the rows of the current front
 decisions.jsonl  every question and answer; `--user script=FILE` replays it
+families.json    what lies between neighbours of the front that was blended last; which of them are of one family
 policies/ID.npz  each policy that entered the archive
 checkpoints/     the whole state after each of the last generations (`jmorl.storage.checkpoints`)
 result.json      the chosen policy and why the run ended, the last file to be written; chosen.npz is its file
@@ -32,13 +34,14 @@ from envs.checks import check_same
 from envs.core import Environment
 from jmorl.config import Config
 from jmorl.display.commands import command
-from jmorl.events import Decided, Event, GenerationFinished, RunFinished
+from jmorl.events import Blended, Decided, Event, GenerationFinished, RunFinished
 from jmorl.learning.check import check_run
 from jmorl.loop import make_method
 from jmorl.search.policy import Policy
 from jmorl.storage.checkpoints import CheckpointWriter
 from jmorl.storage.csv_log import CsvLog, Row, csv_text
 from jmorl.storage.decision_log import DecisionLog
+from jmorl.storage.families_file import families_document
 from jmorl.storage.files import partial_path, remove, write_json, write_text
 from jmorl.storage.layout import Layout
 from jmorl.storage.lock import FolderInUse, RunLock, check_unlocked
@@ -152,6 +155,8 @@ class RunFolder:
         return {**logs, self.decisions.path.name: self.decisions.past}
 
     def _record_generation(self, event: GenerationFinished) -> None:
+        if isinstance(event, Blended):
+            write_json(self.layout.families, families_document(event))
         members = event.state.archive.members
         self.save_policies([policy for policy in event.offspring if policy in members])
         self.policies.append([self._policy_row(policy) for policy in event.offspring])
@@ -214,6 +219,7 @@ class RunFolder:
             **self._named("low", nothing if policy.interval is None else policy.interval[0]),
             **self._named("high", nothing if policy.interval is None else policy.interval[1]),
             **self._named("raw", nothing if policy.raw is None else policy.raw),
+            "blend": str(policy.blend) if policy.blend else None,
         }
 
     def _named(self, prefix: str, vector: np.ndarray) -> dict[str, float | None]:

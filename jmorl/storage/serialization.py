@@ -7,7 +7,7 @@ Letters: N policies, M objectives, R records, F numbers of one kind in a snapsho
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import jax
@@ -20,7 +20,7 @@ from jmorl.learning.moppo import MOPPO
 from jmorl.loop import make_method
 from jmorl.methods.base import Method, MethodError, PackedSearch
 from jmorl.search.archive import Archive
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Blend, Confirmation, Policy
 from jmorl.state import RunState
 from jmorl.units import RunningUnits
 
@@ -54,6 +54,7 @@ def pack(state: RunState, method: Method[Any]) -> PackedState:
         "counters": {name: int(getattr(state, name)) for name in COUNTERS},
         "policies": [
             {"id": p.id, "generation": p.generation, "parent": p.parent, "predicted": p.predicted is not None}
+            | _packed_blend(p)
             for p in policies
         ],
         "archive": [policy.id for policy in state.archive.members],
@@ -98,6 +99,7 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
             predicted=arrays["predicted"][row].copy() if origin["predicted"] else None,
             interval=_interval(arrays, row),
             raw=arrays["raw"][row].copy() if "raw" in arrays else None,
+            **_unpacked_blend(origin),
         )
         for row, origin in enumerate(document["policies"])
     }
@@ -111,6 +113,26 @@ def unpack(packed: PackedState, config: Config, environment: Environment[Any]) -
         choice=None if choice is None else policies[choice],
         **document["counters"],
     )
+
+
+def _packed_blend(policy: Policy) -> dict[str, Any]:
+    """Return what only a blend has: of which policies it is, and where its score comes from. Nothing for others."""
+    if policy.blend is None or policy.confirmation is None:
+        return {}
+    return {"blend": asdict(policy.blend), "confirmation": jax.tree.map(_as_json, vars(policy.confirmation))}
+
+
+def _unpacked_blend(origin: Mapping[str, Any]) -> dict[str, Any]:
+    if "blend" not in origin:
+        return {}
+    blend = Blend(*(tuple(origin["blend"][name]) for name in ("parents", "coefficients")))
+    found = origin["confirmation"]
+    scores = {name: np.array(found[name]) for name in ("claimed", "claimed_std", "error")}
+    return {"blend": blend, "confirmation": Confirmation(episodes=found["episodes"], **scores)}
+
+
+def _as_json(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _interval(arrays: Mapping[str, np.ndarray], row: int) -> np.ndarray | None:

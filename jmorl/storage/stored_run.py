@@ -15,7 +15,7 @@ import envs
 from envs.core import Objective
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.decision.records import DecisionRecord, Record, ScriptError, read_log
-from jmorl.search.policy import Confirmation, Policy
+from jmorl.search.policy import Blend, Confirmation, Policy
 from jmorl.storage.csv_log import read_rows
 from jmorl.storage.documents import check_fields, json_object
 from jmorl.storage.layout import Layout
@@ -154,8 +154,10 @@ def _check_together(run: StoredRun) -> None:
     known, generations, objectives = len(run.policies), len(run.metrics["generation"]), len(run.objectives)
     if not run.front:
         raise StoredRunError(f"{layout.front} has no policy")
-    # A run that was killed may have noted the policies of a generation, but not yet the generation.
-    if max(policy.generation for policy in run.policies) > generations - bool(run.result):
+    # A run that was killed may have noted the policies of a generation, but not yet the generation; one that has ended
+    # may have been killed while its front was blended.
+    trained = [policy.generation for policy in run.policies if policy.blend is None or not run.result]
+    if max(trained) > generations - bool(run.result):
         raise StoredRunError(f"{layout.metrics} ends before {layout.policies}")
     if run.result and not 0 <= run.result["chosen"]["policy"] < known:
         raise StoredRunError(f"{layout.result} names a policy that {layout.policies} does not have")
@@ -193,6 +195,13 @@ def _whole_number(cell: str) -> int:
     return int(cell)
 
 
+def _blend(cell: str) -> Blend | None:
+    """Return the blend that a cell tells of, as `12:0.4 15:0.6`; None for an empty one."""
+    pairs = [part.partition(":") for part in cell.split()]
+    parents, shares = tuple(_whole_number(parent) for parent, _, _ in pairs), tuple(float(share) for *_, share in pairs)
+    return Blend(parents, shares) if pairs else None
+
+
 def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy:
     """Return the policy of a row; what the version of the run did not write is NaN, or None."""
 
@@ -220,4 +229,5 @@ def _policy(row: Mapping[str, str], objectives: tuple[Objective, ...]) -> Policy
         predicted=vector_or_none("predicted"),
         interval=None if vector_or_none("low") is None else np.stack([vector("low"), vector("high")]),
         raw=vector_or_none("raw"),
+        blend=_blend(row.get("blend", "")),
     )

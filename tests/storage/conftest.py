@@ -81,6 +81,7 @@ def make_state(make_policy, small_config):
             iterations=10 * generation,
             evaluation_steps=2**40 + generation,
             policies=len(policies),
+            blendings=generation,
             questions=5,
             policies_shown=17,
         )
