@@ -23,17 +23,19 @@ if TYPE_CHECKING:
         Question,
         WeightQuestion,
     )
-    from jmorl.events import Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
+    from jmorl.evaluation import export_blend
+    from jmorl.events import Blended, Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished, Seconds
     from jmorl.experiments.comparison import Comparison, Contender, compare
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
     from jmorl.loop import run
     from jmorl.methods.base import Method, MethodError, PackedSearch, Problem, Prospect, Tasks
     from jmorl.methods.registry import register_method
-    from jmorl.search.policy import Policy
+    from jmorl.search.families import Blending, Link
+    from jmorl.search.policy import Blend, Policy
     from jmorl.state import RunState
     from jmorl.storage.policy_file import load_policy, save_policy
-    from jmorl.storage.resume import branch, resume
+    from jmorl.storage.resume import blend, branch, resume
     from jmorl.storage.run_folder import RunFolder
     from jmorl.storage.stored_run import read_run
 
@@ -45,6 +47,9 @@ __all__ = [
     "AnswerError",
     "AnyQuestion",
     "Back",
+    "Blend",
+    "Blended",
+    "Blending",
     "Choose",
     "Comparison",
     "Compiled",
@@ -55,6 +60,7 @@ __all__ = [
     "DecisionMaker",
     "Event",
     "GenerationFinished",
+    "Link",
     "Method",
     "MethodError",
     "NavigationFinished",
@@ -76,8 +82,10 @@ __all__ = [
     "Tasks",
     "TrainingFault",
     "WeightQuestion",
+    "blend",
     "branch",
     "compare",
+    "export_blend",
     "load_policy",
     "navigate",
     "read_run",
@@ -96,17 +104,19 @@ _HOMES = {
     "jmorl.decision.answers": "Adjust Answer AnswerError Back Choose PointAnswer",
     "jmorl.decision.navigation": "NavigationFinished PointDecided navigate",
     "jmorl.decision.protocol": "AnyQuestion DecisionMaker PairQuestion PointQuestion Question WeightQuestion",
-    "jmorl.events": "Compiled Decided Event GenerationFinished Resumed RunFinished Seconds",
+    "jmorl.evaluation": "export_blend",
+    "jmorl.events": "Blended Compiled Decided Event GenerationFinished Resumed RunFinished Seconds",
     "jmorl.experiments.comparison": "Comparison Contender compare",
     "jmorl.learning.devices": "use_all_cpu_cores",
     "jmorl.learning.population": "TrainingFault",
     "jmorl.loop": "run",
     "jmorl.methods.registry": "register_method",
     "jmorl.methods.base": "Method MethodError PackedSearch Problem Prospect Tasks",
-    "jmorl.search.policy": "Policy",
+    "jmorl.search.families": "Blending Link",
+    "jmorl.search.policy": "Blend Policy",
     "jmorl.state": "RunState",
     "jmorl.storage.policy_file": "load_policy save_policy",
-    "jmorl.storage.resume": "branch resume",
+    "jmorl.storage.resume": "blend branch resume",
     "jmorl.storage.run_folder": "RunFolder",
     "jmorl.storage.stored_run": "read_run",
     "envs": "Objective",

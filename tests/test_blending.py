@@ -17,6 +17,8 @@ from jmorl.decision.users import make_user
 from jmorl.evaluation import evaluate_stored
 from jmorl.events import Blended, Decided, GenerationFinished, RunFinished
 from jmorl.loop import run
+from jmorl.report.families_plot import families_figure
+from jmorl.report.plots import draw_run
 from jmorl.report.progress import watcher
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Blend
@@ -24,7 +26,7 @@ from jmorl.storage.afterwards import choose_afterwards
 from jmorl.storage.layout import Layout
 from jmorl.storage.policy_file import PolicyFileError, load_policy
 from jmorl.storage.resume import CannotContinue, blend, branch
-from jmorl.storage.stored_run import read_run
+from jmorl.storage.stored_run import StoredRunError, read_run
 from tests.resuming import follow, go_on, outcome, train
 
 MOST = 3
@@ -302,3 +304,35 @@ def test_policies_that_do_not_fit_are_not_mixed(blended):
     second = replace(second, header=second.header | {"environment": "mo-halfcheetah-v5"})
     with pytest.raises(PolicyFileError, match="cannot be blended"):
         mix([first, second], Blend((0, 1), (0.5, 0.5)))
+
+
+def test_families_are_drawn(blended, whole, tmp_path):
+    """A line for each link, by way of the blend half-way where it holds; a ring for each blend that joined."""
+    path, event = blended
+    run, before = read_run(path), read_run(whole)
+    assert families_figure(before, "title") is None
+    figure = families_figure(run, "title")
+    assert figure is not None
+    first = figure.axes[0]
+    solid = [line for line in first.get_lines() if line.get_linestyle() == "-"]
+    dotted = [line for line in first.get_lines() if line.get_linestyle() == ":"]
+    links = event.blending.links
+    assert (len(solid), len(dotted)) == (sum(link.holds for link in links), sum(not link.holds for link in links))
+    assert len(figure.axes) == 3  # pairs of objectives
+    rings, dots = first.collections
+    assert len(np.asarray(rings.get_offsets())) == len(event.offspring)
+    assert len(np.asarray(dots.get_offsets())) == len(event.blending.front)
+    assert tmp_path / "families.png" in draw_run(run, tmp_path)
+
+
+def test_a_file_of_families_that_does_not_fit_is_named(blended, tmp_path):
+    path = shutil.copytree(blended[0], tmp_path / "run")
+    file = Layout(path).families
+    document = json.loads(file.read_text())
+    document["links"][0]["ends"] = [0, 999]
+    file.write_text(json.dumps(document))
+    with pytest.raises(StoredRunError, match="families.json speaks of what .*policies.csv does not have"):
+        read_run(path)
+    file.write_text("{}")
+    with pytest.raises(StoredRunError, match="families.json"):
+        read_run(path)

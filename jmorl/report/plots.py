@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from jmorl.report.families_plot import families_figure
 from jmorl.report.front_plot import front_figure
 from jmorl.report.parallel_coordinates import pairs_figure, parallel_figure
 from jmorl.report.run_plots import prediction_figure, progress_figure
@@ -21,8 +22,9 @@ def draw_run(run: StoredRun, folder: Path) -> list[Path]:
 
     front.png: for two objectives every policy, the front of each generation, choices and bounds; for more the
     final front as parallel coordinates, and front_pairs.png with every pair of objectives. progress.png: the
-    metrics over the steps. prediction.png: predicted against realised changes; a run that ended with the warm-up
-    has none. Raises PlotError if some of them cannot be drawn, when the others are.
+    metrics over the steps. families.png: what lies between the policies of a front that was blended. prediction.png:
+    predicted against realised changes; a run that ended with the warm-up has none. Raises PlotError if some of them
+    cannot be drawn, when the others are.
     """
     config = run.config
     title = f"{config.env}, {config.method}, user {config.user}, seed {config.seed}"
@@ -31,8 +33,9 @@ def draw_run(run: StoredRun, folder: Path) -> list[Path]:
         draws = {"front.png": front_figure}
     else:
         draws = {"front.png": parallel_figure, "front_pairs.png": pairs_figure}
+    draws |= {"families.png": families_figure, "prediction.png": prediction_figure, "progress.png": progress_figure}
     drawn, failed = [], []
-    for name, draw in {**draws, "prediction.png": prediction_figure, "progress.png": progress_figure}.items():
+    for name, draw in draws.items():
         try:
             with style():
                 figure = draw(run, title)

@@ -18,6 +18,7 @@ from jmorl.decision.records import DecisionRecord, Record, ScriptError, read_log
 from jmorl.search.policy import Blend, Confirmation, Policy
 from jmorl.storage.csv_log import read_rows
 from jmorl.storage.documents import check_fields, json_object
+from jmorl.storage.families_file import Families, read_families
 from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import check_config, read_manifest
 from jmorl.storage.versions import NewerFormat
@@ -56,6 +57,7 @@ class StoredRun:
     front: tuple[Policy, ...]  # at least one
     decisions: tuple[Record, ...]
     result: Mapping[str, Any] | None  # None for a run that has not ended
+    families: Families | None = None  # of the front that was blended last; None if none was
 
     @property
     def chosen(self) -> Policy | None:
@@ -91,6 +93,7 @@ def read_run(path: Path | str) -> StoredRun:
         objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
         decisions = tuple(read_log(layout.decisions)) if layout.decisions.exists() else ()
         result = _result(layout.result) if layout.result.exists() else None
+        families = read_families(layout.families) if layout.families.exists() else None
     with _reading(layout.metrics):
         metrics = _metrics(read_rows(layout.metrics))
     with _reading(layout.policies):
@@ -100,7 +103,7 @@ def read_run(path: Path | str) -> StoredRun:
         front = tuple(by_id[_whole_number(row["policy"])] for row in read_rows(layout.front))
     generations = len(metrics["generation"])
     decisions = tuple(record for record in decisions if record.generation <= generations)
-    run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result)
+    run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result, families)
     _check_together(run)
     with _reading(layout.result):
         _ = run.chosen  # its confirmed score can be read
@@ -161,6 +164,10 @@ def _check_together(run: StoredRun) -> None:
         raise StoredRunError(f"{layout.metrics} ends before {layout.policies}")
     if run.result and not 0 <= run.result["chosen"]["policy"] < known:
         raise StoredRunError(f"{layout.result} names a policy that {layout.policies} does not have")
+    if run.families:
+        mentioned = {end for link in run.families.links for end in link.ends}
+        if not mentioned <= set(range(known)) or any(len(link.values) != objectives for link in run.families.links):
+            raise StoredRunError(f"{layout.families} speaks of what {layout.policies} does not have")
     for record in run.decisions:
         values = [shown.values for shown in record.shown]
         if isinstance(record, DecisionRecord):
