@@ -6,9 +6,10 @@ DEMO_OUT ?= runs/demo
 INSTALLED := $(VENV)/.installed
 BROWSER := $(VENV)/.browser
 PLAYGROUND := $(VENV)/.playground
+BENCHMARKS := $(VENV)/.benchmarks
 
 .PHONY: demo studio test test-slow test-studio screenshots check format bench bench-demo bench-physics bench-checkpoints \
-	bench-selection bench-studio quality fronts paper clean
+	bench-selection bench-studio quality continuum fronts paper clean
 
 demo: $(INSTALLED)  ## train on MountainCar with an artificial user, choose, and save a policy (about a minute)
 	$(BIN)/jmorl train --env mo-mountaincarcontinuous-v0 --method interactive --user A --out $(DEMO_OUT) --force
@@ -60,6 +61,9 @@ bench-physics: $(INSTALLED)  ## accuracy and speed of every runner's dynamics, b
 quality: $(INSTALLED)  ## how good the found policies are against the exact front: 5 seeds, 3 users, 2 methods
 	$(BIN)/python -m benchmarks.quality
 
+continuum: $(BENCHMARKS)  ## what blending does to fronts, beside as many steps of training: half an hour
+	$(BIN)/python -m benchmarks.continuum
+
 fronts: $(INSTALLED)  ## fronts on the tasks of PGMORL's authors beside published ones: hours; goes on where it was interrupted
 	$(BIN)/python -m benchmarks.fronts
 
@@ -77,6 +81,10 @@ $(BROWSER): $(INSTALLED) /usr/bin/chromium
 
 $(PLAYGROUND): $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[playground]'
+	touch $@
+
+$(BENCHMARKS): $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[benchmarks]'
 	touch $@
 
 /usr/bin/chromium:
