@@ -1,6 +1,8 @@
 """Stored policies, and blends of them, on fresh episodes: in their own environment, and in MO-Gymnasium's."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -38,14 +40,21 @@ def evaluate_stored(policy: StoredPolicy, keys: jax.Array) -> EpisodeReturns:
     Another number of episodes is another compiled program: the last bits of a return may differ. Raises
     PolicyFileError if the environment cannot be made here, and ComputationFailed.
     """
-    environment = policy_environment(policy.header["environment"])
-    discount = policy.header["discount"]
+    program = _program(policy.header["environment"], policy.header["discount"])
+    returns: EpisodeReturns = result_of(program, policy.arrays(), keys)
+    return returns
 
-    def episode(key: jax.Array) -> EpisodeReturns:
+
+@lru_cache(maxsize=4)
+def _program(environment_id: str, discount: float) -> Callable[..., EpisodeReturns]:
+    """Return what scores any policy of an environment, given by its arrays, from start keys [episodes]."""
+    environment = policy_environment(environment_id)
+
+    def episode(arrays: dict[str, Any], key: jax.Array) -> EpisodeReturns:
+        policy = StoredPolicy.of_arrays(arrays)
         return episode_returns(environment, lambda observation, _: policy.action(observation, jnp), key, discount)
 
-    returns: EpisodeReturns = result_of(jax.jit(jax.vmap(episode)), keys)
-    return returns
+    return jax.jit(jax.vmap(episode, in_axes=(None, 0)))
 
 
 def export_blend(place: Path, blend: Blend, target: Path, force: bool = False) -> StoredPolicy:
@@ -54,11 +63,20 @@ def export_blend(place: Path, blend: Blend, target: Path, force: bool = False) -
     Raises PolicyFileError, and ComputationFailed.
     """
     check_target(target, force)
-    mixture = mix([load_policy(policy_path(place, parent)) for parent in blend.parents], blend)
-    returns = evaluate_stored(mixture, jax.random.split(jax.random.key(BLEND_SEED), BLEND_EPISODES))
+    scored = score_blend(mix([load_policy(policy_path(place, parent)) for parent in blend.parents], blend))
+    try:
+        write_stored_policy(target, scored)
+    except OSError as error:
+        raise PolicyFileError(f"{target} cannot be written: {error.strerror}") from error
+    return scored
+
+
+def score_blend(policy: StoredPolicy) -> StoredPolicy:
+    """Return a blend with the score of fresh episodes. Raises PolicyFileError if they have none, ComputationFailed."""
+    returns = evaluate_stored(policy, jax.random.split(jax.random.key(BLEND_SEED), BLEND_EPISODES))
     undiscounted = np.asarray(returns.undiscounted, np.float64)
     if not np.isfinite(undiscounted).all():
-        raise PolicyFileError(f"the blend {blend} has returns that are not finite")
+        raise PolicyFileError("the returns of this blend are not finite")
     scores = {
         "values": undiscounted.mean(axis=0).tolist(),
         "score": undiscounted.mean(axis=0).tolist(),
@@ -66,12 +84,7 @@ def export_blend(place: Path, blend: Blend, target: Path, force: bool = False) -
         "discounted": np.asarray(returns.discounted, np.float64).mean(axis=0).tolist(),
         "evaluation_episodes": BLEND_EPISODES,
     }
-    mixture = replace(mixture, header=mixture.header | scores)
-    try:
-        write_stored_policy(target, mixture)
-    except OSError as error:
-        raise PolicyFileError(f"{target} cannot be written: {error.strerror}") from error
-    return mixture
+    return replace(policy, header=policy.header | scores)
 
 
 def evaluate_in_gymnasium(policy: StoredPolicy, episodes: int, seed: int) -> np.ndarray:

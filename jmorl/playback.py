@@ -48,7 +48,7 @@ def record(policy: StoredPolicy, key: jax.Array, most_steps: int | None = None) 
     share compiled programs. Raises PolicyFileError if that environment cannot be made here.
     """
     programs = _programs(policy.header["environment"], most_steps)
-    arrays = _arrays(policy)
+    arrays = policy.arrays()
     episode = result_of(programs.start, key)
     first = episode[0].physics
     chunks = []
@@ -83,7 +83,7 @@ def _programs(environment_id: str, most_steps: int | None) -> _Programs:
 
     @jax.jit
     def go_on(arrays: dict[str, Any], episode: tuple[Any, jax.Array]) -> tuple[Any, tuple[Any, jax.Array, jax.Array]]:
-        policy = StoredPolicy(log_std=np.empty(0), **arrays)
+        policy = StoredPolicy.of_arrays(arrays)
 
         def act(
             carry: tuple[Any, jax.Array], _: None
@@ -95,14 +95,3 @@ def _programs(environment_id: str, most_steps: int | None) -> _Programs:
         return jax.lax.scan(act, episode, None, length=-(-length // chunks))
 
     return _Programs(environment, length, chunks, jax.jit(environment.reset), go_on)
-
-
-def _arrays(policy: StoredPolicy) -> dict[str, Any]:
-    """Return the function that decides about an action."""
-    return {
-        "header": {"network": {name: policy.header["network"][name] for name in ("variance_floor", "clip")}},
-        "layers": policy.layers,
-        "observation_mean": policy.observation_mean,
-        "observation_variance": policy.observation_variance,
-        "box": policy.box,
-    }

@@ -59,7 +59,8 @@ MAY_IMPORT = {
         *("jmorl.playback", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
     },
     "jmorl.studio": {
-        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.events", "jmorl.playback"),
+        *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.evaluation", "jmorl.events"),
+        *("jmorl.learning", "jmorl.playback"),
         *("jmorl.methods", "jmorl.report", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
         "jmorl.units",
     },

@@ -90,6 +90,21 @@ class StoredPolicy:
         """Return the deterministic action; `xp` may be `jax.numpy` to trace it."""
         return self.box.action(self._network(observation, xp), xp)
 
+    def arrays(self) -> dict[str, Any]:
+        """Return all that an action depends on, to be traced: `StoredPolicy.of_arrays` gives the policy again."""
+        return {
+            "header": {"network": {name: self.header["network"][name] for name in INPUT}},
+            "layers": self.layers,
+            "observation_mean": self.observation_mean,
+            "observation_variance": self.observation_variance,
+            "box": self.box,
+        }
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, Any]) -> "StoredPolicy":
+        """Return a policy that acts as the one whose arrays these are, and does no more."""
+        return cls(log_std=np.empty(0), **arrays)
+
     def _network(self, observation: Any, xp: ModuleType) -> Any:
         """Return the mean of the normalised action."""
         floor, limit = self.header["network"]["variance_floor"], self.header["network"]["clip"]

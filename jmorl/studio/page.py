@@ -8,6 +8,7 @@ from nicegui import ui
 
 from jmorl.studio import texts
 from jmorl.studio.charts.chart_style import BLUE, RED
+from jmorl.studio.panels.between import BetweenPanel
 from jmorl.studio.panels.cards import Cards
 from jmorl.studio.panels.front import FrontPanel
 from jmorl.studio.panels.header import Header
@@ -29,6 +30,7 @@ SIDE: dict[str, Callable[[Tab], Panel]] = {
     texts.PROGRESS: ProgressPanel,
     texts.HISTORY: HistoryPanel,
     texts.NAVIGATION: NavigationPanel,
+    texts.BETWEEN: BetweenPanel,
 }
 KINDS: dict[Tone, Literal["warning", "negative"] | None] = {"hint": None, "warning": "warning", "failure": "negative"}
 

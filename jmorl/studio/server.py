@@ -5,19 +5,24 @@ import logging
 import platform
 import socket
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import urlencode
 
 import jax
 from fastapi import HTTPException
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi.responses import FileResponse, JSONResponse, Response
 from nicegui import app, ui
 
 from envs.drawing import NoDrawing
+from jmorl.evaluation import score_blend
 from jmorl.playback import record
-from jmorl.storage.policy_file import load_policy
+from jmorl.storage.policy_file import StoredPolicy, load_policy, write_stored_policy
+from jmorl.studio.between import blended
 from jmorl.studio.episodes import episode_json
 from jmorl.studio.guard import Guard
 from jmorl.studio.page import Page
@@ -27,6 +32,7 @@ ICON = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="M2 3a11 11 0 0 1 11 11" fill="none" '
     'stroke="#0072B2" stroke-width="2.5"/><circle cx="10" cy="6.5" r="2.6" fill="#E69F00"/></svg>'
 )
+RECORDING = threading.Lock()
 KEPT = "private, max-age=86400"  # an episode never changes
 
 
@@ -90,10 +96,23 @@ def _add_files(session: Session) -> None:
 
     @app.get("/episodes/{run}/{policy}")
     def episode(run: str, policy: int) -> JSONResponse:
-        try:
+        with _not_there():
             return JSONResponse(_episode(_file(session, run, policy)), headers={"cache-control": KEPT})
-        except NoDrawing as error:
-            raise HTTPException(404, str(error)) from error
+
+    @app.get("/between/{run}/{first}/{second}/{per_cent}.npz")
+    def blend_file(run: str, first: int, second: int, per_cent: int) -> Response:
+        with _not_there(), TemporaryDirectory() as folder:
+            target = Path(folder) / "blend.npz"
+            write_stored_policy(target, score_blend(blended(*session.files_of_pair(run, first, second), per_cent)))
+            name = f'attachment; filename="blend-{first}-{second}-{per_cent}.npz"'
+            headers = {"content-disposition": name}
+            return Response(target.read_bytes(), media_type="application/octet-stream", headers=headers)
+
+    @app.get("/between/{run}/{first}/{second}/{per_cent}")
+    def blend_episode(run: str, first: int, second: int, per_cent: int) -> JSONResponse:
+        with _not_there():
+            policy = blended(*session.files_of_pair(run, first, second), per_cent)
+            return JSONResponse(_recorded(policy), headers={"cache-control": KEPT})
 
     @app.get("/policies/{run}/{policy}.npz")
     def policy_file(run: str, policy: int) -> FileResponse:
@@ -108,7 +127,21 @@ def _file(session: Session, run: str, policy: int) -> Path:
     return path
 
 
+@contextmanager
+def _not_there() -> Iterator[None]:
+    """Turn what cannot be given into an answer that says why."""
+    try:
+        yield
+    except (NoDrawing, ValueError) as error:
+        raise HTTPException(404, str(error)) from error
+
+
 @lru_cache(maxsize=32)
 def _episode(path: Path) -> dict[str, Any]:
-    """Record an episode from the first of `jmorl evaluate`'s starts."""
-    return episode_json(record(load_policy(path), jax.random.split(jax.random.key(0), 1)[0]))
+    return _recorded(load_policy(path))
+
+
+def _recorded(policy: StoredPolicy) -> dict[str, Any]:
+    """Record an episode from the first of `jmorl evaluate`'s starts: one at a time, so that all use one program."""
+    with RECORDING:
+        return episode_json(record(policy, jax.random.split(jax.random.key(0), 1)[0]))

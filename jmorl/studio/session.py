@@ -28,6 +28,7 @@ from jmorl.storage.policy_file import PolicyFileError, load_policy
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
+from jmorl.studio.between import BlendScore, score
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.history import Branch, free_folder, read_tree
 from jmorl.studio.person import LeftOff, Person
@@ -164,6 +165,19 @@ class Session:
                     return layout.chosen
         path = layout.policy(policy)
         return path if path.is_file() else None
+
+    def files_of_pair(self, run: str, first: int, second: int) -> tuple[Path, Path]:
+        """Return the files of two archived policies. Raises ValueError if there are none."""
+        files = [(policy, self.policy_file(run, policy)) for policy in (first, second)]
+        missing = [policy for policy, file in files if file is None]
+        if missing:
+            raise ValueError(f"there is no file of policy {' and '.join(map(str, missing))}")
+        one, other = (file for _, file in files if file)
+        return one, other
+
+    def score_between(self, run: str, first: int, second: int, per_cent: int) -> BlendScore:
+        """Return what the blend of two policies returns. Raises ValueError, and ComputationFailed."""
+        return score(*self.files_of_pair(run, first, second), per_cent)
 
     def leave(self) -> None:
         """Leave the run after the generation that is going on, at once if it waits for an answer; it can be resumed."""

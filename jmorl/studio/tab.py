@@ -11,8 +11,10 @@ from nicegui import run
 
 from jmorl.decision.answers import Answer, PointAnswer
 from jmorl.decision.protocol import PointQuestion, Question
+from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
 from jmorl.studio import texts
+from jmorl.studio.between import BlendScore
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.selection import wanted
 from jmorl.studio.session import Session
@@ -42,6 +44,16 @@ class Tab:
     def point_question(self) -> PointQuestion | None:
         """Return the open question of E-NAUTILUS, or None."""
         return self.dialogue.question if self.dialogue and not self.dialogue.chosen else None
+
+    @property
+    def pair(self) -> tuple[int, int] | None:
+        """Return the first two policies that are laid out; None for fewer."""
+        first, second, *_ = [*self.selection.letters, None, None]
+        return None if first is None or second is None else (first, second)
+
+    async def score_between(self, run_id: str, first: int, second: int, per_cent: int) -> BlendScore | None:
+        """Return what the blend of two policies returns; None, and why, if it cannot be scored."""
+        return await self._in_background(self.session.score_between, run_id, first, second, per_cent)
 
     def follow(self) -> None:
         """Take over what the session has now, and show it."""
@@ -152,7 +164,7 @@ class Tab:
         result = None
         try:
             result = await run.io_bound(command, *arguments)
-        except (ValueError, OSError, CheckpointError) as error:
+        except (ValueError, OSError, CheckpointError, ComputationFailed) as error:
             self.tell(str(error), "failure")
         self.follow()
         return result

@@ -8,10 +8,14 @@ from jmorl.display.text import duration, front_question, number_format, plural, 
 from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy
+from jmorl.studio.between import EPISODES, BlendScore
 from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import PERSON, View
 
-POLICIES, PROGRESS, HISTORY, NAVIGATION = "Policies", "Progress", "History", "E-NAUTILUS"  # titles of panels
+# Titles of panels:
+POLICIES, PROGRESS, HISTORY, NAVIGATION, BETWEEN = "Policies", "Progress", "History", "E-NAUTILUS", "Between"
+BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
+SCORING = "Scoring …"
 MOST_POINTS = 3  # that the prediction model is quoted with
 KEYS = (
     ("← →", "look at the next policy along the front"),
@@ -98,6 +102,25 @@ def scores(view: View, policy: Policy) -> str:
     """Return all scores of a policy in one line."""
     each = zip(view.objectives, score_of_each(view, policy), strict=True)
     return ", ".join(f"{objective.label} {score}" for objective, score in each)
+
+
+def blend_name(selection: Selection, pair: tuple[int, int], per_cent: int) -> str:
+    """Say where the dial between two policies is."""
+    first, second = (f"{selection.letters[policy]} (policy {policy})" for policy in pair)
+    if per_cent < 0:
+        return f"Beyond {first}, away from {second}"
+    if per_cent > 100:
+        return f"Beyond {second}, away from {first}"
+    if per_cent in (0, 100):
+        return f"This is {second if per_cent else first}"
+    return f"{100 - per_cent} % of {first}, {per_cent} % of {second}"
+
+
+def blend_scores(view: View, score: BlendScore) -> str:
+    """Return the scores of a blend in one line, as those of a policy."""
+    each = zip(view.objectives, score.mean, score.std, formats_of(view), strict=True)
+    found = [minus(f"{o.label} {value:{fmt}} ±{std:{fmt}} {o.unit}") for o, value, std, fmt in each]
+    return f"{', '.join(found)}, over {plural(EPISODES, 'episode')}"
 
 
 def raw_returns(view: View, policy: Policy) -> str:

@@ -249,3 +249,34 @@ def test_the_keyboard_is_enough(browser, small, tmp_path):
         end.press("Enter")
         tab.page.get_by_text("The result is policy").wait_for()
         assert [each["stop"] for each in decisions(path)] == [False, False, True]
+
+
+def test_a_dial_leads_from_one_policy_to_another(browser, tmp_path):
+    """The picture, the scores and the file follow it; the keys of the page do not move what is laid out meanwhile."""
+    path = tmp_path / "dial"
+    with Served("--out", path, "--steps", 624_000, "--population.iterations", 4, "--ask", "always") as studio:
+        tab = Tab(browser, studio.address)
+        tab.asked(1)
+        tab.tab("Between")
+        tab.page.get_by_text("Lay out two policies").wait_for()
+        tab.tab("Policies")
+        first, second = tab.look_at(0), tab.look_at(tab.rows().count() - 1)
+        tab.tab("Between")
+        dial = tab.page.get_by_label("way from the first policy to the second")
+        tab.page.get_by_text(f"50 % of A (policy {first}), 50 % of B (policy {second})").wait_for()
+        tab.page.get_by_text("over 16 episodes").wait_for()
+        middle = tab.page.locator(".between-scores").inner_text()
+        tab.page.locator(".dial canvas").wait_for()
+        tab.screenshot("10-between")
+        dial.press("End")
+        tab.page.get_by_text(f"Beyond B (policy {second}), away from A (policy {first})").wait_for()
+        tab.page.get_by_text("over 16 episodes").wait_for()
+        assert tab.page.locator(".between-scores").inner_text() != middle
+        dial.press("ArrowLeft")
+        assert dial.input_value() == "145"
+        assert tab.card(first).is_visible() and tab.card(second).is_visible()
+        with tab.page.expect_download() as download:
+            tab.page.get_by_role("button", name="Save the file of this blend").click()
+        policy = load_policy(download.value.path())
+        assert policy.header["blend"]["parents"] == sorted((first, second))
+        assert not tab.problems

@@ -14,6 +14,8 @@ from websockets.sync.client import connect
 
 from jmorl.cli import main
 from jmorl.storage.manifest import read_manifest
+from jmorl.storage.policy_file import load_policy
+from jmorl.storage.stored_run import read_run
 from jmorl.studio.server import is_trouble
 from tests.registered import ThreeWays
 from tests.resuming import train
@@ -94,9 +96,40 @@ def test_the_policy_file_is_served_whole(studio, runs, chosen):
     assert json.loads(str(np.load(io.BytesIO(answer.content))["header"]))["id"] == chosen
 
 
+@pytest.fixture(scope="module")
+def pair(runs):
+    """Two policies of the front."""
+    first, second, *_ = [policy.id for policy in read_run(runs / NAME).front]
+    return first, second
+
+
+def test_a_blend_is_served_as_a_file_with_a_score_of_its_own(studio, runs, pair):
+    answer = httpx.get(f"{studio.address}/between/{run_of(runs)}/{pair[0]}/{pair[1]}/25.npz", timeout=60)
+    assert f"blend-{pair[0]}-{pair[1]}-25.npz" in answer.headers["content-disposition"]
+    file = runs / "blend.npz"
+    file.write_bytes(answer.content)
+    policy = load_policy(file)
+    shares = dict(zip(pair, (0.75, 0.25), strict=True))
+    assert policy.header["blend"] == {"parents": sorted(pair), "coefficients": [shares[each] for each in sorted(pair)]}
+    assert policy.header["evaluation_episodes"] == 100 and np.isfinite(policy.header["values"]).all()
+
+
+def test_what_is_no_blend_is_refused_with_a_reason(studio, runs, pair):
+    address = f"{studio.address}/between/{run_of(runs)}"
+    for path, reason in (
+        (f"{pair[0]}/{pair[1]}/151", "from -50 to 150 % of the way"),
+        (f"{pair[0]}/99999/50", "there is no file of policy 99999"),
+        (f"{pair[0]}/{pair[1]}/50", "drawing"),  # the environment has none
+    ):
+        answer = httpx.get(f"{address}/{path}", timeout=60)
+        assert answer.status_code == 404 and reason in answer.json()["detail"]
+
+
 @pytest.mark.parametrize(
     "path",
     [
+        "/between/RUN/..%2F..%2Fsecret/1/50.npz",
+        "/between/another/0/1/50.npz",
         "/policies/../secret.npz",
         "/policies/..%2F..%2Fsecret/1.npz",
         "/policies/RUN/..%2F..%2Fsecret.npz",

@@ -3,6 +3,7 @@
 import asyncio
 import json
 
+import numpy as np
 import pytest
 
 from jmorl.decision.answers import Answer, Choose
@@ -185,3 +186,42 @@ def test_enautilus_is_taken_step_by_step_and_told_when_it_has_moved_on(watching)
     assert tab.dialogue is begun
     tab.close_dialogue()
     assert tab.dialogue is None
+
+
+def test_a_pair_is_what_is_laid_out_first(tab, question):
+    first, second, third, *_ = [policy.id for policy in question.front]
+    assert tab.pair is None
+    tab.look_at(second)
+    assert tab.pair is None
+    tab.look_at(first)
+    assert tab.pair == (second, first)
+    tab.look_at(third)
+    assert tab.pair == (second, first)
+    tab.put_away(second)
+    assert set(tab.pair) == {first, third}
+
+
+def test_a_blend_is_scored_and_named(watching, question):
+    tab = watching.tab
+    first, second = (policy.id for policy in question.front[:2])
+    tab.look_at(first)
+    tab.look_at(second)
+    ends = [asyncio.run(tab.score_between(tab.view.run, first, second, per_cent)) for per_cent in (0, 100)]
+    between = asyncio.run(tab.score_between(tab.view.run, first, second, 40))
+    assert not np.array_equal(between.mean, ends[0].mean) and not np.array_equal(ends[0].mean, ends[1].mean)
+    assert texts.blend_scores(tab.view, between).endswith("over 16 episodes")
+    names = [texts.blend_name(tab.selection, (first, second), per_cent) for per_cent in (-10, 0, 40, 100, 120)]
+    one, other = f"A (policy {first})", f"B (policy {second})"
+    assert names == [
+        f"Beyond {one}, away from {other}",
+        f"This is {one}",
+        f"60 % of {one}, 40 % of {other}",
+        f"This is {other}",
+        f"Beyond {other}, away from {one}",
+    ]
+
+
+def test_a_blend_of_a_policy_that_is_not_there_is_told_of(watching, question):
+    tab = watching.tab
+    assert asyncio.run(tab.score_between(tab.view.run, question.front[0].id, 99999, 50)) is None
+    assert watching.said == [("failure", "there is no file of policy 99999")]

@@ -1,18 +1,14 @@
 """The policies that are laid out: their behaviour, their scores, and what choosing them would mean."""
 
 from nicegui import ui
-from nicegui.element import Element
 
 from jmorl.search.policy import Policy
 from jmorl.studio import texts
 from jmorl.studio.charts.chart_style import decimals
 from jmorl.studio.panels.panel import Shown
+from jmorl.studio.panels.player import Player
 from jmorl.studio.selection import LETTERS
 from jmorl.studio.tab import Tab
-
-
-class Player(Element, component="player.js"):
-    """A canvas that plays an episode, or the controls of all of them."""
 
 
 class Cards:

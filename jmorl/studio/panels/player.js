@@ -105,7 +105,7 @@ export default {
     </div>`,
   props: { src: String, objectives: Array, decimals: Array, label: String, controls: Boolean },
   data: () => ({ message: "", playing: clock.playing, length: 0 }),
-  async mounted() {
+  mounted() {
     this.shown = { duration: () => this.duration(), draw: () => this.draw() };
     clock.shown.add(this.shown);
     clock.wake();
@@ -113,15 +113,10 @@ export default {
     this.observer = new ResizeObserver(clock.wake);
     this.observer.observe(this.$refs.canvas);
     this.message = "Recording an episode …";
-    try {
-      const response = await fetch(this.src);
-      if (!response.ok) throw new Error((await response.json().catch(() => ({}))).detail ?? "the server failed");
-      this.episode = Object.freeze(await response.json());
-      this.message = "";
-      clock.wake();
-    } catch (error) {
-      this.message = `No playback: ${error.message}`;
-    }
+    this.load();
+  },
+  watch: {
+    src() { this.load(); }, // the episode that is shown goes on until the new one is here
   },
   beforeUnmount() {
     clock.shown.delete(this.shown);
@@ -129,6 +124,22 @@ export default {
     clock.wake();
   },
   methods: {
+    async load() {
+      const src = this.src;
+      if (!src) return;
+      try {
+        const response = await fetch(src);
+        if (!response.ok) throw new Error((await response.json().catch(() => ({}))).detail ?? "the server failed");
+        const episode = Object.freeze(await response.json());
+        if (src !== this.src) return; // another one is wanted by now
+        this.episode = episode;
+        this.drawn = null;
+        this.message = "";
+        clock.wake();
+      } catch (error) {
+        if (src === this.src) this.message = `No playback: ${error.message}`;
+      }
+    },
     toggle() {
       clock.play(!clock.playing);
     },
