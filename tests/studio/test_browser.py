@@ -276,7 +276,7 @@ def test_a_dial_leads_from_one_policy_to_another(browser, tmp_path):
         assert dial.input_value() == "145"
         assert tab.card(first).is_visible() and tab.card(second).is_visible()
         with tab.page.expect_download() as download:
-            tab.page.get_by_role("button", name="Save the file of this blend").click()
+            tab.page.get_by_role("button", name="save the file of this blend").click()
         policy = load_policy(download.value.path())
         assert policy.header["blend"]["parents"] == sorted((first, second))
         assert not tab.problems

@@ -24,14 +24,17 @@ class BetweenPanel:
         with ui.element("div").classes("between"):
             self.hint = ui.label(texts.BETWEEN_HINT).classes("explanation")
             with ui.element("div").classes("dial") as self.dial:
-                self.heading = ui.label()
+                with ui.element("div").classes("card-head"):
+                    self.heading = ui.label().classes("card-title")
+                    ui.button(icon="download", on_click=self._save).props(
+                        'flat dense round size=sm aria-label="save the file of this blend"'
+                    )
                 # The browser's own, which keeps its keys to itself: those of the page move along the front.
                 self.slider = ui.element("input").props(f"type=range min={-BEYOND} max={100 + BEYOND} step={STEP}")
                 self.slider.props('aria-label="way from the first policy to the second, in per cent"')
                 self.slider.on("input", self._moved, js_handler="(event) => emit(event.target.value)")
                 self.player = Player()
                 self.scores = ui.label().classes("between-scores")
-                self.save = ui.button("Save the file of this blend", on_click=self._save).props("no-caps dense outline")
 
     async def show_scores(self) -> None:
         """Score the blend that the dial is at; nothing where the dial has moved on by then."""
