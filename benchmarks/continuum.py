@@ -28,17 +28,16 @@ from jmorl.display.tables import PlainTable
 from jmorl.events import Blended, GenerationFinished
 from jmorl.learning.devices import use_all_cpu_cores
 from jmorl.loop import blend, run
-from jmorl.search.bounds import within
 from jmorl.search.families import largest_gap
 from jmorl.search.metrics import FrontMetrics
 from jmorl.search.policy import Policy
 from jmorl.search.scaling import Scale, range_scale
 from jmorl.state import RunState
 from jmorl.storage.files import write_json
+from jmorl.storage.resume import BLENDS
 
 CAR = "mo-mountaincarcontinuous-v0"
 ENVIRONMENTS = CAR, "mo-halfcheetah-v5", "mo-hopper-v5"
-BLENDS = 4  # for each agent, as `jmorl blend` has by default
 EXACT, RESULT = (Path(__file__).with_name(name) for name in ("exact_front.json", "continuum.json"))
 
 
@@ -113,7 +112,7 @@ def _measures(config: Config, front: FrontMetrics, state: RunState, scale: Scale
         "front": front.front_size,
         "hypervolume": front.hypervolume,
         "expected_utility": front.expected_utility,
-        "largest_gap": largest_gap(scaled[within(scaled, np.zeros(scaled.shape[1]))]),
+        "largest_gap": largest_gap(np.clip(scaled, 0, 1)),
     }
     if config.env == CAR:
         found["below_exact_front"] = float(np.mean(list(_shortfalls(state.archive.values))))

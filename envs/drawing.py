@@ -6,7 +6,7 @@ it is.
 """
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import ceil, floor
 from typing import Any, Literal
 
@@ -91,8 +91,8 @@ class Scene:
 
     def to_json(self) -> dict[str, Any]:
         """Return the scene as JSON's types; every shape with its `kind`, its class in lower case."""
-        shapes = [{"kind": type(shape).__name__.lower(), **asdict(shape)} for shape in self.shapes]
-        return {"shapes": shapes, "window": asdict(self.window)}
+        shapes = [{"kind": type(shape).__name__.lower(), **vars(shape)} for shape in self.shapes]
+        return {"shapes": shapes, "window": dict(vars(self.window))}
 
 
 def level_ground(window: Window) -> Iterator[Shape]:

@@ -298,15 +298,15 @@ def _items(text: str) -> list[str]:
 
 def _shares(text: str) -> Blend:
     """Return what `12:0.4,15:0.6` says; shares need not add up to one."""
-    pairs = [part.partition(":") for part in text.split(",")]
+    pairs = [part.partition(":") for part in re.split("[, ]+", text.strip())]
     try:
         shares = {_id(policy): float(share) for policy, _, share in pairs}
     except (ValueError, argparse.ArgumentTypeError):
         shares = {}
     total = sum(shares.values())
     if len(shares) < len(pairs) or not (0 < total < math.inf):
-        form = "is written as 12:0.4,15:0.6, each id once, with shares that add up to more than 0"
-        raise argparse.ArgumentTypeError(f"{form}, not {text!r}")
+        rule = "give ids with shares, such as 12:0.4,15:0.6, each id once; the shares must add up to more than 0"
+        raise argparse.ArgumentTypeError(f"{text!r} is no blend: {rule}")
     return Blend(tuple(sorted(shares)), tuple(shares[each] / total for each in sorted(shares)))
 
 

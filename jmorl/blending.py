@@ -117,7 +117,7 @@ class _Search:
                 behind = self._behind(best, scaled, edge, ahead)
                 if behind is not None:
                     found.append((width, _combined(best[behind], best[edge], BEYOND)))
-                if self._behind(best, scaled, edge, -ahead) is None:  # an end of the front
+                else:  # an end of the front
                     found.append((width, _combined(best[other], best[edge], BEYOND)))
         wide = [(width, shares) for width, shares in found if width > LEAST_GAP]
         new = {

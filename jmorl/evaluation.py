@@ -57,11 +57,12 @@ def _program(environment_id: str, discount: float) -> Callable[..., EpisodeRetur
     return jax.jit(jax.vmap(episode, in_axes=(None, 0)))
 
 
-def export_blend(place: Path, blend: Blend, target: Path, force: bool = False) -> StoredPolicy:
+def export_blend(place: Path | str, blend: Blend, target: Path | str, force: bool = False) -> StoredPolicy:
     """Mix policies of the run in a folder, score the blend by fresh episodes, and write it to a file.
 
     Raises PolicyFileError, and ComputationFailed.
     """
+    place, target = Path(place), Path(target)
     check_target(target, force)
     scored = score_blend(mix([load_policy(policy_path(place, parent)) for parent in blend.parents], blend))
     try:

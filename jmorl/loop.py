@@ -165,6 +165,7 @@ class _Run:
             finished = self.blended(state, self._to_be_blended(state), self.config.search.final_blends)
             yield finished
             state = finished.state
+            satisfied = self._satisfied(state)
         front = state.archive.members if satisfied else self.method.final_front(state)
         best = finalists(front, None if satisfied else state.choice, self.population.size)
         state, best = self._confirmed(state, best)

@@ -14,7 +14,7 @@ from jmorl import blending
 from jmorl.cli import main
 from jmorl.config import ConfigError
 from jmorl.decision.users import make_user
-from jmorl.evaluation import evaluate_stored
+from jmorl.evaluation import evaluate_stored, export_blend
 from jmorl.events import Blended, Decided, GenerationFinished, RunFinished
 from jmorl.loop import run
 from jmorl.report.families_plot import families_figure
@@ -239,17 +239,58 @@ def test_a_front_of_one_policy_is_not_blended(whole, tmp_path, monkeypatch):
     path = shutil.copytree(whole, tmp_path / "run")
     import jmorl.storage.resume as module
 
-    original = module._restore
+    original = module.last_good
 
     def alone(*arguments):
-        state = original(*arguments)
-        assert state is not None
-        return replace(state, archive=replace(state.archive, members=state.archive.members[:1]))
+        found, notes = original(*arguments)
+        assert found is not None
+        checkpoint, state = found
+        return (checkpoint, replace(state, archive=replace(state.archive, members=state.archive.members[:1]))), notes
 
-    monkeypatch.setattr(module, "_restore", alone)
+    monkeypatch.setattr(module, "last_good", alone)
     with pytest.raises(CannotContinue, match="has one policy, and so nothing to blend it with"):
         blend(path)
     assert outcome(path) == outcome(whole)
+
+
+def test_a_run_whose_last_checkpoint_is_damaged_is_not_cut_back(whole, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run")
+    document = path / "checkpoints" / "00003" / "checkpoint.json"
+    document.write_bytes(document.read_bytes() + b"x")
+    with pytest.raises(CannotContinue, match="no whole checkpoint of its end.*checkpoint.json is damaged"):
+        blend(path)
+    assert outcome(path)[1:] == outcome(whole)[1:]
+
+
+def test_a_front_of_two_grows_beyond_its_ends(whole, tmp_path, monkeypatch):
+    import jmorl.storage.resume as module
+
+    path = shutil.copytree(whole, tmp_path / "run")
+    original = module.last_good
+
+    def two(*arguments):
+        found, notes = original(*arguments)
+        assert found is not None
+        checkpoint, state = found
+        return (checkpoint, replace(state, archive=replace(state.archive, members=state.archive.members[:2]))), notes
+
+    monkeypatch.setattr(module, "last_good", two)
+    monkeypatch.setattr(module, "_restore", lambda _, found, __: found[1])
+    event = blend(path)
+    assert event.blending.tried > 3
+
+
+@pytest.mark.parametrize("coefficients", [(0.5, 0.1), ()])
+def test_shares_that_are_no_blend_are_refused_in_python_too(blended, tmp_path, coefficients):
+    path, event = blended
+    ids = tuple(policy.id for policy in event.blending.front[:2])[: len(coefficients)]
+    with pytest.raises(PolicyFileError, match="add up to one"):
+        export_blend(str(path), Blend(ids, coefficients), str(tmp_path / "x.npz"))
+
+
+def test_at_least_one_blend_must_be_allowed(whole):
+    with pytest.raises(ValueError, match="at least one blend"):
+        blend(whole, 0)
 
 
 def test_there_are_no_blends_in_paper_units(small_config):
@@ -288,7 +329,7 @@ def test_the_end_of_a_blend_is_its_policy(blended, tmp_path):
 def test_a_blend_that_makes_no_sense_is_refused(whole, tmp_path, written, capsys):
     with pytest.raises(SystemExit):
         main(["export", str(whole), "--blend", written, "--to", str(tmp_path / "x.npz")])
-    assert "is written as 12:0.4,15:0.6" in capsys.readouterr().err
+    assert "is no blend: give ids with shares, such as 12:0.4,15:0.6" in capsys.readouterr().err
 
 
 def test_a_blend_of_a_policy_that_is_not_there_says_so(whole, tmp_path, capsys):

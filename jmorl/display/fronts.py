@@ -57,7 +57,10 @@ def front_table(
 
 def _origin(policy: Policy) -> str:
     """Say what a blend is of."""
-    return f"blend {policy.blend}" if policy.blend else ""
+    if policy.blend is None:
+        return ""
+    shares = zip(policy.blend.parents, policy.blend.coefficients, strict=True)
+    return f"blend {' '.join(f'{parent}:{share:.3g}' for parent, share in shares)}"
 
 
 def _outside(bounded: bool, good: bool) -> str:

@@ -8,9 +8,8 @@ from rich.console import RenderableType
 from envs.core import Objective
 from jmorl.display.fronts import front_table, stacked_label
 from jmorl.display.tables import PlainTable
-from jmorl.display.text import duration, number, number_format, plural
+from jmorl.display.text import duration, number, number_format, plural, short_count
 from jmorl.events import Blended
-from jmorl.search.bounds import within
 from jmorl.search.families import Blending, largest_gap
 from jmorl.search.policy import values_of
 from jmorl.search.scaling import range_scale
@@ -31,8 +30,8 @@ def _front(event: Blended) -> PlainTable:
     blending = event.blending
     values = values_of(blending.front), event.state.archive.values
     scale = range_scale(values[0])
-    between_ends = [each[within(scale.apply(each), np.zeros(each.shape[1]))] for each in values]
-    gaps = [f"{largest_gap(scale.apply(each)):.1%} of the range" for each in between_ends]
+    # What lies beyond the ends of the front before counts as its end.
+    gaps = [f"{largest_gap(np.clip(scale.apply(each), 0, 1)):.1%} of the range" for each in values]
     rows = {
         "policies": [str(len(each)) for each in values],
         "hypervolume": [number(each.hypervolume) for each in (event.before, event.front)],
@@ -42,8 +41,11 @@ def _front(event: Blended) -> PlainTable:
     table = PlainTable("", "before", "after", title="Front", words=[""])
     for name, cells in rows.items():
         table.add_row(name, *cells)
-    joined = f"{len(blending.blends)} joined the front"
-    table.caption = f"{plural(blending.tried, 'blend')} tried, {joined}, in {duration(event.seconds.total)}."
+    steps = f"{short_count(blending.evaluation_steps)} environment steps"
+    table.caption = (
+        f"{plural(blending.tried, 'blend')} tried by {steps} in {duration(event.seconds.total)}; "
+        f"{len(blending.blends)} joined the front."
+    )
     return table
 
 
@@ -52,7 +54,7 @@ def _families(blending: Blending, objectives: Sequence[Objective]) -> PlainTable
     by_id = {policy.id: policy for policy in blending.front}
     formats = [number_format(column) for column in values_of(blending.front).T]
     table = PlainTable("policies", *map(stacked_label, objectives), words=["policies"])
-    table.title = "Families: blends within one lose next to nothing"
+    table.title = "Families: half-way between neighbours of one, blends lose next to nothing"
     for family in blending.families:
         values = values_of([by_id[each] for each in family])
         ends = zip(values.min(axis=0), values.max(axis=0), formats, strict=True)

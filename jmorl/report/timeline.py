@@ -91,7 +91,9 @@ class Timeline:
         if self.phase == "warm-up" and self.compiled:
             warmup = self.warmup_steps / self.compiled.steps_per_second
             return max(warmup - (now - self.since), 0.0) + (self._seconds(now, self.generations) or 0.0)
-        left = self.generations - self.generation
+        if self.phase == "blending":
+            return None
+        left = max(self.generations - self.generation, -1)
         return self._seconds(now, left if self.phase == "generation" else left + 1)
 
     def _seconds(self, now: float, generations: int) -> float | None:

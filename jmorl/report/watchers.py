@@ -84,7 +84,8 @@ class Lines(Watcher):
                 )
             case Resumed():
                 front = len(event.state.archive.members)
-                return f"resumed after {self._name(event.state.generation)}, with a front of {front}"
+                after = "its blending" if event.state.blendings else self._name(event.state.generation)
+                return f"resumed after {after}, with a front of {front}"
             case Blended():
                 return self._blending_line(event)
             case GenerationFinished():
@@ -119,8 +120,10 @@ class Lines(Watcher):
     def _blending_line(self, event: Blended) -> str:
         blending, front = event.blending, event.front
         facts = [
-            f"{len(blending.blends)} of {plural(blending.tried, 'blend')} joined the front, now of {front.front_size}",
-            f"hypervolume {number(event.before.hypervolume)}, now {number(front.hypervolume)}",
+            f"{len(blending.blends)} of {plural(blending.tried, 'blend')} joined the front",
+            f"front of {front.front_size}",
+            f"hypervolume {number(front.hypervolume)} after {number(event.before.hypervolume)}",
+            f"{short_count(blending.evaluation_steps)} steps to evaluate",
             plural(len(blending.families), "family"),
         ]
         return f"blending: {', '.join(facts)} (evaluate {duration(event.seconds.total)})"

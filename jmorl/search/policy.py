@@ -25,8 +25,8 @@ class Blend:
     coefficients: tuple[float, ...]  # of each; they add up to one, and a negative one leads away from its policy
 
     def __str__(self) -> str:
-        """Return it as it is written: `12:0.4 15:0.6`."""
-        return " ".join(f"{parent}:{share:g}" for parent, share in zip(self.parents, self.coefficients, strict=True))
+        """Return all of it in a line: `12:0.4 15:0.6`."""
+        return " ".join(f"{parent}:{share}" for parent, share in zip(self.parents, self.coefficients, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

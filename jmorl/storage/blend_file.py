@@ -15,6 +15,9 @@ OF_ITS_TRAINING = ("generation", "parent")
 
 def mix(policies: Sequence[StoredPolicy], blend: Blend) -> StoredPolicy:
     """Return the blend of stored policies, which has no score. Raises PolicyFileError for those that do not fit."""
+    coefficients = np.array(blend.coefficients, float)
+    if not len(policies) == len(coefficients) > 0 or not abs(coefficients.sum() - 1) < 1e-6:
+        raise PolicyFileError(f"a blend needs a share of each policy, and they must add up to one; it has {blend}")
     first = policies[0]
     if any(_kind(other) != _kind(first) for other in policies[1:]):
         raise PolicyFileError("policies of other environments, networks or versions cannot be blended")

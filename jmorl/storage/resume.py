@@ -2,7 +2,7 @@
 
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,12 +25,15 @@ from jmorl.search.policy import Policy
 from jmorl.state import RunState
 from jmorl.storage.checkpoints import Checkpoint, stored_generations
 from jmorl.storage.decision_log import DecisionLog
+from jmorl.storage.documents import DocumentError
+from jmorl.storage.families_file import read_families
 from jmorl.storage.files import remove, remove_partial, write_json, written_whole
 from jmorl.storage.layout import Layout, checkpoint_path
 from jmorl.storage.lock import FolderInUse, RunLock
 from jmorl.storage.manifest import Manifest, circumstances, differences, now
 from jmorl.storage.policy_file import PolicyFileError, holds, load_policy
 from jmorl.storage.run_folder import RunFolder, check_free
+from jmorl.storage.stored_run import read_run
 from jmorl.storage.stored_state import CannotContinue, Found, last_good, read_start, state_after
 from jmorl.storage.versions import NewerFormat
 
@@ -113,9 +116,11 @@ def blend(path: Path | str, most: int | None = None, population: Population | No
     """Make the front of a run that has ended denser by blends, and record them in its folder.
 
     At most so many join, by default four for each agent. The run's result stays as it is. Raises CannotContinue,
-    FolderInUse, NewerFormat and NotAsDeclared, having changed nothing, and TrainingFault.
+    FolderInUse, NewerFormat, NotAsDeclared, StoredRunError and ValueError, having changed nothing.
     """
     path = Path(path)
+    if most is not None and most < 1:
+        raise ValueError(f"at least one blend must be allowed to join, not {most}")
     manifest, config = read_start(path)
     if not Layout(path).result.exists():
         raise CannotContinue(f"the run in {path} has not ended; first go on with it: {command('resume', path)}")
@@ -126,14 +131,15 @@ def blend(path: Path | str, most: int | None = None, population: Population | No
     user = _its_user(path, config, environment)
     with _locked(path) as lock:
         found, notes = last_good(path, manifest, config, environment)
-        if found is None:
-            raise CannotContinue("; ".join([f"{path} has no checkpoint, which has what policies learn from", *notes]))
+        _refuse_to_forget(path, found, notes)
+        assert found is not None
+        if len(found[1].archive.members) < 2:
+            raise CannotContinue(f"the front in {path} has one policy, and so nothing to blend it with")
         with _opened(path, config, environment, lock, manifest) as folder:
             state = _restore(folder, found, notes)
             assert state is not None
-            if len(state.archive.members) < 2:
-                raise CannotContinue(f"the front in {path} has one policy, and so nothing to blend it with")
-            event = blend_state(config, environment, state, most or BLENDS * config.population.agents, user, population)
+            most = BLENDS * config.population.agents if most is None else most
+            event = blend_state(config, environment, state, most, user, population)
             folder.record(event)
             return event
 
@@ -173,6 +179,19 @@ def branch(
     except BaseException:
         folder.close()
         raise
+
+
+def _refuse_to_forget(path: Path, found: Found | None, notes: Sequence[str]) -> None:
+    """Raise CannotContinue if the last checkpoint that is whole is not of the end of the run in a folder.
+
+    Files may be ahead of it by one blending that was broken off.
+    """
+    policies = read_run(path).policies
+    trained = max(policy.generation for policy in policies if policy.blend is None)
+    known = found[1].generation if found else -1
+    if known < max(trained, max(policy.generation for policy in policies) - 1):
+        why = f"{path} has no whole checkpoint of its end, which has the networks of its front"
+        raise CannotContinue("; ".join([why, *notes]))
 
 
 def _environment(config: Config) -> Environment[Any]:
@@ -276,11 +295,21 @@ def _restore(folder: RunFolder, found: Found | None, notes: list[str]) -> RunSta
         layout.front.unlink(missing_ok=True)
     if not layout.result.exists():
         layout.chosen.unlink(missing_ok=True)
-    if not state or not state.blendings:
+    if not state or _is_of_later(layout.families, state.generation):
         layout.families.unlink(missing_ok=True)
     for generation in later:
         remove(checkpoint_path(layout.checkpoints, generation))
     return state
+
+
+def _is_of_later(families: Path, generation: int) -> bool:
+    """Return whether a file of families is of a later generation, or cannot be read."""
+    try:
+        return read_families(families).generation > generation
+    except FileNotFoundError:
+        return False
+    except (OSError, DocumentError):
+        return True
 
 
 def _restore_logs(folder: RunFolder, checkpoint: Checkpoint | None) -> None:

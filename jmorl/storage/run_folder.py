@@ -155,13 +155,13 @@ class RunFolder:
         return {**logs, self.decisions.path.name: self.decisions.past}
 
     def _record_generation(self, event: GenerationFinished) -> None:
-        if isinstance(event, Blended):
-            write_json(self.layout.families, families_document(event))
         members = event.state.archive.members
         self.save_policies([policy for policy in event.offspring if policy in members])
         self.policies.append([self._policy_row(policy) for policy in event.offspring])
         self.metrics.append([self._metrics_row(event)])
         self.write_front(members)
+        if isinstance(event, Blended):
+            write_json(self.layout.families, families_document(event))
         self.checkpoints.save(event.state, self.logs())
 
     def _record_result(self, event: RunFinished) -> None:

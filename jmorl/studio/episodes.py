@@ -26,18 +26,18 @@ def episode_json(recording: Recording) -> dict[str, Any]:
     seconds = recording.environment.step_seconds or STEP_SECONDS
     stride = ceil(LEAST_SECONDS / seconds - 1e-9)
     steps = [*range(0, recording.steps, stride), recording.steps]
-    scenes = [_rounded(recording.scene(step).to_json()) for step in steps]
+    scenes = [recording.scene(step).to_json() for step in steps]
     still = _still(scenes)
     frames = [
         {
             "step": step,
-            "window": scene["window"],
-            "shapes": scene["shapes"][still:],
+            "window": _rounded(scene["window"]),
+            "shapes": _rounded(scene["shapes"][still:]),
             "totals": _rounded(recording.totals[step].tolist()),
         }
         for step, scene in zip(steps, scenes, strict=True)
     ]
-    return {"seconds": stride * seconds, "still": scenes[0]["shapes"][:still], "frames": frames}
+    return {"seconds": stride * seconds, "still": _rounded(scenes[0]["shapes"][:still]), "frames": frames}
 
 
 def _still(scenes: list[dict[str, Any]]) -> int:

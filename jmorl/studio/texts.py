@@ -51,6 +51,8 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
             return f"Warm-up: training {plural(view.config.population.agents, 'new agent')}, {elapsed}"
         case "generation":
             return f"Training generation {timeline.generation}"
+        case "blending":
+            return f"Blending the front, {elapsed}"
     return "Thinking"
 
 
