@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +14,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     import mujoco
+
+OF_THREAD = threading.local()
 
 
 class PlanarCapsule(NamedTuple):
@@ -53,13 +57,29 @@ def planar_capsules(model: mujoco.MjModel, qpos: np.ndarray) -> list[PlanarCapsu
     """Return the model's capsules at the joint positions `qpos` [nq], in the order of its file."""
     import mujoco
 
-    data = mujoco.MjData(model)
+    data = _data_of(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
-    capsules = []
-    for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE):
-        radius, half_length, _ = model.geom_size[geom]
-        centre, axis = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)[:, 2]
-        start, end = (centre + sign * half_length * axis for sign in (-1, 1))
-        capsules.append(PlanarCapsule(model.geom(geom).name, start[[0, 2]], end[[0, 2]], float(radius)))
-    return capsules
+    geoms, names = _capsules_of(model)
+    centres, axes = data.geom_xpos[geoms][:, [0, 2]], data.geom_xmat[geoms].reshape(-1, 3, 3)[:, [0, 2], 2]
+    reaches = model.geom_size[geoms, 1, None] * axes
+    return list(map(PlanarCapsule, names, centres - reaches, centres + reaches, model.geom_size[geoms, 0].tolist()))
+
+
+def _data_of(model: mujoco.MjModel) -> mujoco.MjData:
+    """Return what this thread computes the model's poses with: to make it anew takes longer than a pose."""
+    import mujoco
+
+    known: dict[mujoco.MjModel, mujoco.MjData] = vars(OF_THREAD).setdefault("data", {})
+    if model not in known:
+        known[model] = mujoco.MjData(model)
+    return known[model]
+
+
+@cache
+def _capsules_of(model: mujoco.MjModel) -> tuple[np.ndarray, list[str]]:
+    """Return the indices of the model's capsules, and their names."""
+    import mujoco
+
+    geoms = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
+    return geoms, [model.geom(geom).name for geom in geoms]

@@ -41,6 +41,7 @@ class _Point:
 
 def blend_front(
     front: Sequence[Policy],
+    archive: Sequence[Policy],
     population: Population,
     keys: jax.Array,  # [episodes] that the run's policies are evaluated from
     fresh_key: jax.Array,  # for starts that confirm
@@ -49,20 +50,23 @@ def blend_front(
     generation: int,
     next_id: int,
 ) -> Blending:
-    """Return blends that no policy of a front dominates, at most so many, each with a confirmed score.
+    """Return blends of a front that no policy of the archive dominates, at most so many, each with a confirmed score.
 
     Half-way between all neighbours one is tried; then, where gaps are largest, more: between what was found, and beyond
     one neighbour of a gap, away from what lies behind it. Of the best those are taken that fill gaps, and are confirmed
     by fresh episodes.
     """
-    return _Search(front, population, keys).result(fresh_key, max(episodes, LEAST_EPISODES), most, generation, next_id)
+    return _Search(front, archive, population, keys).result(
+        fresh_key, max(episodes, LEAST_EPISODES), most, generation, next_id
+    )
 
 
 class _Search:
     """Blends that are tried on the way."""
 
-    def __init__(self, front: Sequence[Policy], population: Population, keys: jax.Array):
+    def __init__(self, front: Sequence[Policy], archive: Sequence[Policy], population: Population, keys: jax.Array):
         self.front = sorted(front, key=lambda policy: tuple(policy.values))
+        self.archive = archive
         self.population = population
         self.keys = keys
         self.scale: Scale = range_scale(values_of(front))
@@ -87,7 +91,7 @@ class _Search:
             self._try(promising)
             left -= len(promising)
         blends = self._confirmed(key, episodes, most, generation)
-        numbered = tuple(_with_id(policy, next_id + index) for index, policy in enumerate(blends))
+        numbered = tuple(replace(policy, id=next_id + index) for index, policy in enumerate(blends))
         return replace(blending, blends=numbered, tried=len(self.tried), evaluation_steps=self.steps)
 
     def _links(self) -> Iterator[Link]:
@@ -115,10 +119,8 @@ class _Search:
             for edge, other in ((first, second), (second, first)):
                 ahead = scaled[other] - scaled[edge]
                 behind = self._behind(best, scaled, edge, ahead)
-                if behind is not None:
-                    found.append((width, _combined(best[behind], best[edge], BEYOND)))
-                else:  # an end of the front
-                    found.append((width, _combined(best[other], best[edge], BEYOND)))
+                source = other if behind is None else behind  # with nothing behind it the edge is an end of the front
+                found.append((width, _combined(best[source], best[edge], BEYOND)))
         wide = [(width, shares) for width, shares in found if width > LEAST_GAP]
         new = {
             _name(shares): (width, shares)
@@ -180,9 +182,10 @@ class _Search:
             return []
         scaled, taken = self._scaled(blends), self.scale.apply(values_of(self.front))
         chosen = [self._policy(blends[index], generation) for index in farthest_first(scaled, taken, most)]
-        found, steps = confirmed(chosen, self.population, key, episodes, len(self.keys))
+        scored, steps = confirmed(chosen, self.population, key, episodes, len(self.keys), faults_stop=False)
         self.steps += steps
-        stays = non_dominated(values_of([*self.front, *found]))[len(self.front) :]
+        found = [policy for policy in scored if np.isfinite(policy.values).all()]
+        stays = non_dominated(values_of([*self.archive, *found]))[len(self.archive) :]
         return [policy for policy, each in zip(found, stays, strict=True) if each]
 
     def _policy(self, point: _Point, generation: int) -> Policy:
@@ -213,7 +216,3 @@ def _combined(first: _Point, second: _Point, position: float) -> Shares:
 
 def _name(shares: Shares) -> frozenset[tuple[int, float]]:
     return frozenset(shares.items())
-
-
-def _with_id(policy: Policy, id: int) -> Policy:
-    return replace(policy, id=id)

@@ -47,12 +47,19 @@ def finalists(front: Sequence[Policy], choice: Policy | None, agents: int) -> li
 
 
 def confirmed(
-    policies: Sequence[Policy], population: Population, key: jax.Array, episodes: int, at_once: int
+    policies: Sequence[Policy],
+    population: Population,
+    key: jax.Array,
+    episodes: int,
+    at_once: int,
+    faults_stop: bool = True,
 ) -> tuple[list[Policy], int]:
     """Return the policies with scores from so many fresh episodes or a few more, and the environment steps of these.
 
-    All are scored from the same starts, drawn from `key`, `at_once` in each call of the compiled program.
+    All are scored from the same starts, drawn from `key`, `at_once` in each call of the compiled program. Raises
+    TrainingFault for a return that is not finite, unless faults do not stop it.
     """
+    evaluate = population.evaluate if faults_stop else population.try_out
     rounds = -(-episodes // at_once)
     found: list[Policy] = []
     steps = 0
@@ -60,7 +67,7 @@ def confirmed(
         train_states = jax.tree.map(lambda *leaves: np.stack(leaves), *(policy.snapshot for policy in some))
         returns = []
         for number in range(rounds):
-            scored = population.evaluate(train_states, jax.random.split(jax.random.fold_in(key, number), at_once))
+            scored = evaluate(train_states, jax.random.split(jax.random.fold_in(key, number), at_once))
             returns.append(np.asarray(scored.undiscounted, np.float64))
             steps += raw_scores(scored).steps
         together = np.concatenate(returns, axis=1)  # [P, episodes, M]

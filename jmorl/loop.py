@@ -207,6 +207,7 @@ class _Run:
         state = replace(state, generation=state.generation + 1, blendings=state.blendings + 1)
         blending = blend_front(
             front,
+            state.archive.members,
             self.population,
             evaluation_keys(self.config, state.policies),
             _confirmation_key(self.config),

@@ -16,6 +16,7 @@ from jmorl.config import ConfigError
 from jmorl.decision.users import make_user
 from jmorl.evaluation import evaluate_stored, export_blend
 from jmorl.events import Blended, Decided, GenerationFinished, RunFinished
+from jmorl.learning.population import Population
 from jmorl.loop import run
 from jmorl.report.families_plot import families_figure
 from jmorl.report.plots import draw_run
@@ -190,7 +191,7 @@ def test_a_run_that_blends_ends_the_same_wherever_it_is_broken_off(config, ended
 
 
 def test_where_no_blend_is_confirmed_the_front_stays(whole, tmp_path, monkeypatch):
-    def much_worse(policies, *_):
+    def much_worse(policies, *_, **__):
         return [replace(policy, values=policy.values - 1e6) for policy in policies], 1
 
     monkeypatch.setattr(blending, "confirmed", much_worse)
@@ -278,6 +279,27 @@ def test_a_front_of_two_grows_beyond_its_ends(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "_restore", lambda _, found, __: found[1])
     event = blend(path)
     assert event.blending.tried > 3
+
+
+@pytest.mark.parametrize("call", [0, -1])
+def test_a_blend_whose_numbers_are_not_finite_stops_nothing(whole, tmp_path, monkeypatch, call):
+    """Neither where it is tried, nor where it is scored again."""
+    calls = []
+    original = Population.try_out
+
+    def broken(self, train_states, keys):
+        returns = original(self, train_states, keys)
+        calls.append(keys)
+        if call == 0 or len(calls) > 20:  # by then blends are confirmed
+            undiscounted = np.array(returns.undiscounted)
+            undiscounted[0] = np.nan
+            returns = returns._replace(undiscounted=undiscounted)
+        return returns
+
+    monkeypatch.setattr(Population, "try_out", broken)
+    event = blend(shutil.copytree(whole, tmp_path / "run"))
+    assert len(calls) > 20
+    assert all(np.isfinite(policy.values).all() for policy in event.offspring)
 
 
 @pytest.mark.parametrize("coefficients", [(0.5, 0.1), ()])

@@ -6,8 +6,6 @@ Shapes that do not move are given once; every frame has its own shapes of what m
 from math import ceil
 from typing import Any
 
-import numpy as np
-
 from jmorl.playback import Recording
 from jmorl.report.playback import STEP_SECONDS
 
@@ -50,11 +48,11 @@ def _still(scenes: list[dict[str, Any]]) -> int:
 
 
 def _rounded(content: Any) -> Any:
-    match content:
-        case dict():
-            return {name: _rounded(value) for name, value in content.items()}
-        case list() | tuple():
-            return [_rounded(value) for value in content]
-        case float() | np.floating():
-            return round(float(content), DIGITS)
+    """Return JSON's types with numbers of a few digits. Numbers come first: there are most of them."""
+    if isinstance(content, float):
+        return round(float(content), DIGITS)
+    if isinstance(content, list | tuple):
+        return [_rounded(value) for value in content]
+    if isinstance(content, dict):
+        return {name: _rounded(value) for name, value in content.items()}
     return content

@@ -32,6 +32,7 @@ ICON = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="M2 3a11 11 0 0 1 11 11" fill="none" '
     'stroke="#0072B2" stroke-width="2.5"/><circle cx="10" cy="6.5" r="2.6" fill="#E69F00"/></svg>'
 )
+DIAL_STEPS = 300  # of an episode, that are shown of a blend: the dial does not wait for more
 RECORDING = threading.Lock()
 KEPT = "private, max-age=86400"  # an episode never changes
 
@@ -112,7 +113,7 @@ def _add_files(session: Session) -> None:
     def blend_episode(run: str, first: int, second: int, per_cent: int) -> JSONResponse:
         with _not_there():
             policy = blended(*session.files_of_pair(run, first, second), per_cent)
-            return JSONResponse(_recorded(policy), headers={"cache-control": KEPT})
+            return JSONResponse(_recorded(policy, DIAL_STEPS), headers={"cache-control": KEPT})
 
     @app.get("/policies/{run}/{policy}.npz")
     def policy_file(run: str, policy: int) -> FileResponse:
@@ -141,7 +142,7 @@ def _episode(path: Path) -> dict[str, Any]:
     return _recorded(load_policy(path))
 
 
-def _recorded(policy: StoredPolicy) -> dict[str, Any]:
+def _recorded(policy: StoredPolicy, most_steps: int | None = None) -> dict[str, Any]:
     """Record an episode from the first of `jmorl evaluate`'s starts: one at a time, so that all use one program."""
     with RECORDING:
-        return episode_json(record(policy, jax.random.split(jax.random.key(0), 1)[0]))
+        return episode_json(record(policy, jax.random.split(jax.random.key(0), 1)[0], most_steps))
