@@ -343,7 +343,8 @@ def test_export_copies_a_policy(trained, tmp_path, capsys):
     policy = int(rows(trained / "front.csv")[0]["policy"])
     target = tmp_path / "policy.npz"
     assert main(["export", str(trained), "--policy", str(policy), "--to", str(target)]) == 0
-    assert capsys.readouterr().out == f"{target}: policy {policy}\n"
+    said, values = capsys.readouterr().out, load_policy(target).header["values"]
+    assert said.startswith(f"{target}: policy {policy}, north {values[0]:.4g}".rstrip("0")) and said.count("\n") == 1
     assert load_policy(target).header["id"] == policy
     assert main(["export", str(trained), "--to", str(target)]) == 2
     assert "exists; choose another file, or overwrite it with --force" in capsys.readouterr().err
