@@ -160,12 +160,12 @@ class _Run:
             yield finished
             state = finished.state
         satisfied = self._satisfied(state)
-        # What satisfies may lie outside the bounds: the search is not the only one that finds things.
         if not satisfied and self._blends_at_the_end(state):
             finished = self.blended(state, self._to_be_blended(state), self.config.search.final_blends)
             yield finished
             state = finished.state
             satisfied = self._satisfied(state)
+        # What satisfies may lie outside the bounds: the search is not the only one that finds things.
         front = state.archive.members if satisfied else self.method.final_front(state)
         best = finalists(front, None if satisfied else state.choice, self.population.size)
         state, best = self._confirmed(state, best)

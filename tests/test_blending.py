@@ -23,6 +23,7 @@ from jmorl.report.plots import draw_run
 from jmorl.report.progress import watcher
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Blend
+from jmorl.storage import resume as resuming
 from jmorl.storage.afterwards import choose_afterwards
 from jmorl.storage.layout import Layout
 from jmorl.storage.policy_file import PolicyFileError, load_policy
@@ -236,19 +237,28 @@ def test_a_run_that_has_not_ended_is_not_blended(whole, tmp_path, capsys):
     assert f"has not ended; first go on with it: jmorl resume {path}" in capsys.readouterr().err
 
 
-def test_a_front_of_one_policy_is_not_blended(whole, tmp_path, monkeypatch):
+@pytest.fixture
+def front_of(monkeypatch):
+    """Have the state that is found in a folder so many policies in its front."""
+
+    def cut(count):
+        original = resuming.last_good
+
+        def few(*arguments):
+            found, notes = original(*arguments)
+            assert found is not None
+            checkpoint, state = found
+            members = state.archive.members[:count]
+            return (checkpoint, replace(state, archive=replace(state.archive, members=members))), notes
+
+        monkeypatch.setattr(resuming, "last_good", few)
+
+    return cut
+
+
+def test_a_front_of_one_policy_is_not_blended(whole, tmp_path, front_of):
     path = shutil.copytree(whole, tmp_path / "run")
-    import jmorl.storage.resume as module
-
-    original = module.last_good
-
-    def alone(*arguments):
-        found, notes = original(*arguments)
-        assert found is not None
-        checkpoint, state = found
-        return (checkpoint, replace(state, archive=replace(state.archive, members=state.archive.members[:1]))), notes
-
-    monkeypatch.setattr(module, "last_good", alone)
+    front_of(1)
     with pytest.raises(CannotContinue, match="has one policy, and so nothing to blend it with"):
         blend(path)
     assert outcome(path) == outcome(whole)
@@ -263,20 +273,10 @@ def test_a_run_whose_last_checkpoint_is_damaged_is_not_cut_back(whole, tmp_path)
     assert outcome(path)[1:] == outcome(whole)[1:]
 
 
-def test_a_front_of_two_grows_beyond_its_ends(whole, tmp_path, monkeypatch):
-    import jmorl.storage.resume as module
-
+def test_a_front_of_two_grows_beyond_its_ends(whole, tmp_path, monkeypatch, front_of):
     path = shutil.copytree(whole, tmp_path / "run")
-    original = module.last_good
-
-    def two(*arguments):
-        found, notes = original(*arguments)
-        assert found is not None
-        checkpoint, state = found
-        return (checkpoint, replace(state, archive=replace(state.archive, members=state.archive.members[:2]))), notes
-
-    monkeypatch.setattr(module, "last_good", two)
-    monkeypatch.setattr(module, "_restore", lambda _, found, __: found[1])
+    front_of(2)
+    monkeypatch.setattr(resuming, "_restore", lambda _, found, __: found[1])
     event = blend(path)
     assert event.blending.tried > 3
 
