@@ -173,6 +173,11 @@ def test_runs_of_other_comparisons_are_taken(plan):
         (f"steps = {4 * 3 * 16 * 11}", "steps = 10", "steps end within the warm-up"),
         ("[parts.users]", 'contenders = ["nobody"]\n[parts.users]', "there is no contender 'nobody'"),
         ("[parts.users]", 'best = "nowhere.json"\n[parts.users]', "there is no file"),
+        ("[parts.users]", 'best = "plan.toml"\n[parts.users]', "plan.toml has no front of"),
+        ("seeds = [1, 2]", 'seeds = [1, 2]\nrecords = ["nowhere"]', "records: there is no folder"),
+        ("seeds = [1, 2]", "seeds = [1, -2]", "PGMORL, seed -2: seed: must be at least 0"),
+        ('method = "pgmorl"', 'method = "pgmorl"\nsteps = 5', "contender PGMORL: steps belongs to the part"),
+        ("[parts.users]", '[parts.users]\n"a b" = "A"\na_b = "B"', "two users of part three ways have one name"),
         ("[parts.users]", "[parts.user]", "parts.0.users: Field required"),
         ("seeds = [1, 2]", "seeds = [1, 2]\nsed = 3", "sed: Unexpected keyword argument"),
     ],
@@ -183,6 +188,13 @@ def test_what_is_wrong_with_a_plan_is_said_before_anything_is_made(plan, before,
     with pytest.raises(ConfigError, match=problem):
         make_study(plan, work=plan.parent / "work")
     assert [path.name for path in plan.parent.iterdir()] == ["plan.toml"]
+
+
+def test_a_report_elsewhere_makes_its_folder_and_no_file_is_taken_for_one(plan):
+    make_study(plan, run=False, out=plan.parent / "new" / "folder")
+    assert (plan.parent / "new" / "folder" / "REPORT.md").exists()
+    with pytest.raises(ConfigError, match="out: .*plan.toml is a file"):
+        make_study(plan, run=False, out=plan)
 
 
 def test_questions_of_earlier_records_were_all_asked():

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from jmorl.config import ConfigError
 from jmorl.display.console import PlainConsole
 from jmorl.experiments.cells import Places, distinct, known
 from jmorl.experiments.progress import Part, make_all
@@ -20,6 +21,9 @@ def make_study(plan: Path, run: bool = True, out: Path | None = None, work: Path
     console = PlainConsole()
     study = read_plan(plan)
     out = out or plan.parent
+    if out.exists() and not out.is_dir():
+        raise ConfigError([f"out: {out} is a file; name a folder"])
+    out.mkdir(parents=True, exist_ok=True)
     places = Places(out / "records", work or Path("runs/study"))
     cells = {part.name: distinct(study.cells(part)) for part in study.parts}
     every = distinct(cell for some in cells.values() for cell in some)

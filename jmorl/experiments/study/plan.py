@@ -37,6 +37,7 @@ from jmorl.experiments.naming import is_name
 from jmorl.experiments.record import RunRecord, read_record
 from jmorl.loop import make_method
 
+OF_A_PART = ("env", "steps", "user", "seed")  # settings that no contender has
 EVERYBODY = "everybody"  # whose run it is that serves all users
 
 
@@ -109,12 +110,21 @@ class Study:
         return {cell.key: record for cell in cells for record in there if cell.config.is_identified_by(record.digest)}
 
     def exact(self, part: StudyPart) -> np.ndarray | None:
-        """Return the vectors [N, M] that are the best there is, if the plan names a file of them."""
+        """Return the vectors [N, M] that are the best there is, if the plan has a file of them. Raises ConfigError."""
         if part.best is None:
             return None
         names = [objective.name for objective in envs.make(part.env).objectives]
-        front = json.loads((self.folder / part.best).read_text(encoding="utf-8"))["front"]
-        return np.array([[point[name] for name in names] for point in front])
+        path = self.folder / part.best
+        try:
+            front = json.loads(path.read_text(encoding="utf-8"))["front"]
+            vectors = np.array([[float(point[name]) for name in names] for point in front])
+        except FileNotFoundError:
+            raise ConfigError([f"best: there is no file {path}"]) from None
+        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+            raise ConfigError([f"best: {path} has no front of {', '.join(names)}: {error!r}"]) from None
+        if not len(vectors) or not np.isfinite(vectors).all():
+            raise ConfigError([f"best: {path} must have at least one point, and finite numbers"])
+        return vectors
 
 
 _STUDY: TypeAdapter[Study] = TypeAdapter(Study)
@@ -143,9 +153,21 @@ def _problems(study: Study) -> Iterator[str]:
             yield f"there is no {what}"
     if len(set(study.seeds)) < len(study.seeds):
         yield "a seed is given twice"
-    if len({part.name for part in study.parts}) < len(study.parts):
-        yield "two parts have one name"
+    for name, settings in study.contenders.items():
+        for key in (key for key in OF_A_PART if key in settings):
+            yield f"contender {name}: {key} belongs to the part, or to the study"
+    for folder in (folder for folder in study.records if not (study.folder / folder).is_dir()):
+        yield f"records: there is no folder {study.folder / folder}"
     users = [user for part in study.parts for user in part.users]
+    for what, names in (
+        ("parts", [part.name for part in study.parts]),
+        ("contenders", list(study.contenders)),
+        *((f"users of part {part.name}", list(part.users)) for part in study.parts),
+    ):
+        files = [file_name(name) for name in names]
+        for file in sorted({file for file in files if files.count(file) > 1}):
+            same = " and ".join(repr(name) for name in names if file_name(name) == file)
+            yield f"two {what} have one name for files: {same}"
     for name in (*study.contenders, *(part.name for part in study.parts), *users):
         if not is_name(name):
             yield f"{name!r}: files are named after it; write it with letters, digits and spaces"
@@ -154,18 +176,28 @@ def _problems(study: Study) -> Iterator[str]:
             yield f"part {part.name} has no users"
         for contender in (each for each in part.contenders if each not in study.contenders):
             yield f"part {part.name}: there is no contender {contender!r}; there are {', '.join(study.contenders)}"
-        for contender, user, seed in product(study.contenders_of(part), part.users, study.seeds[:1]):
-            try:
-                study.config(part, contender, user, seed)
-                judge = study.user(part, user)
-            except (ConfigError, ValueError) as error:
-                yield f"part {part.name}, {contender}, {user}: {error}"
-                continue
+        try:
             objectives = len(envs.make(part.env).objectives)
+        except (ConfigError, ValueError) as error:
+            yield f"part {part.name}: {error}"
+            continue
+        for contender, seed in product(study.contenders_of(part), study.seeds):
+            try:
+                study.config(part, contender, None, seed)
+            except (ConfigError, ValueError) as error:
+                yield f"part {part.name}, {contender}, seed {seed}: {error}"
+        for user in part.users:
+            try:
+                judge = study.user(part, user)
+            except ValueError as error:
+                yield f"part {part.name}, user {user}: {error}"
+                continue
             if not isinstance(judge, TargetUser) and judge.utility(np.zeros((1, objectives))) is None:
                 yield f"part {part.name}: {user} has no utility by which runs could be compared: {part.users[user]}"
-        if part.best is not None and not (study.folder / part.best).is_file():
-            yield f"part {part.name}: there is no file {study.folder / part.best}"
+        try:
+            study.exact(part)
+        except ConfigError as error:
+            yield f"part {part.name}: {error}"
 
 
 def file_name(*parts: str) -> str:
