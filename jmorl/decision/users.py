@@ -22,6 +22,7 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -41,6 +42,12 @@ from jmorl.decision.utility import (
 )
 from jmorl.display.characters import to_path
 
+T = TypeVar("T")
+VALUED = {  # users that are nothing without a value
+    "weights": "weights=W1,W2,...",
+    "target": "target=Z1,Z2,...",
+    "script": "script=FILE",
+}
 OPTIONS = {  # of users with weights, and how they are written
     "chebyshev": "chebyshev[=Z1,Z2,...]",
     "concave": "concave=WORST1,WORST2,...,BEST1,BEST2,...",
@@ -74,15 +81,17 @@ def parse_user(spec: str, objectives: int | None) -> Callable[[], DecisionMaker]
     name, has_options, options = spec.strip().partition(",")
     if name in USERS and (options or not has_options):
         return _paper_user(name, options, objectives)
-    if kind == "weights" and has_value:
+    if kind == "weights" and value:
         return _weighted_user(value, objectives)
-    if kind == "target" and has_value:
+    if kind == "target" and value:
         return _target_user(value, objectives)
-    if kind == "script" and has_value:
+    if kind == "script" and value:
         return _scripted_user(value)
     if spec.strip() == "terminal":
         return _terminal_user
-    near = did_you_mean(nearest(kind, (*USERS, "weights", "target", "terminal", "script")))
+    if kind in VALUED:
+        raise ValueError(f"user {kind} has no value; write {VALUED[kind]}")
+    near = did_you_mean(nearest(kind, (*USERS, *VALUED, "terminal")))
     raise ValueError(f"unknown user {spec!r}; known: {KNOWN}{near}")
 
 
@@ -98,15 +107,30 @@ def _paper_user(name: str, options: str, objectives: int | None) -> Callable[[],
 def _weighted_user(written: str, objectives: int | None) -> Callable[[], DecisionMaker]:
     """Return a user of weights, and options as in `OPTIONS`, all separated by commas."""
     options = _options(written)
-    weights = _weights(options["weights"], "weights", objectives)
-    count = len(weights)
-    shape = _shape(options, count)
-    limits = tuple(_limits(options["limits"], count)) if "limits" in options else None
-    slips = Slips(_number(options, "random", most=1.0), _number(options, "temperature"))
-    before = _weights(options["before"], "before", count) if "before" in options else None
-    changes_in = _number(options, "until")
-    if (before is None) != ("until" not in options) or not changes_in.is_integer():
-        raise ValueError("who changes their mind needs before=W1,W2,... and until=GENERATION, a whole number")
+    problems: list[str] = []
+
+    def read(what: Callable[[], T], otherwise: T) -> T:
+        """Return what is written, or note why it cannot be."""
+        try:
+            return what()
+        except ValueError as error:
+            problems.append(str(error))
+            return otherwise
+
+    count = objectives or len(options["weights"].split(","))
+    weights = read(lambda: _weights(options["weights"], "weights", objectives), [1.0] * count)
+    linear: Callable[[list[float]], Utility] = linear_utility
+    shape = read(lambda: _shape(options, count), linear)
+    limits = read(lambda: tuple(_limits(options["limits"], count)), None) if "limits" in options else None
+    slips = Slips(
+        read(lambda: _number(options, "random", most=1.0), 0.0), read(lambda: _number(options, "temperature"), 0.0)
+    )
+    before = read(lambda: _weights(options["before"], "before", count), weights) if "before" in options else None
+    changes_in = read(lambda: _number(options, "until"), 1.0)
+    if (before is None) != ("until" not in options) or not changes_in.is_integer() or (before and changes_in < 1):
+        problems.append("who changes their mind needs before=W1,W2,... and until=GENERATION, a whole number from 1")
+    if problems:
+        raise ValueError("; ".join(problems))
 
     def utility(some: list[float]) -> Utility:
         return limited_utility(shape(some), limits) if limits else shape(some)
@@ -176,7 +200,7 @@ def _weights(listed: str, name: str, count: int | None) -> list[float]:
 
 def _limits(listed: str, count: int) -> list[float]:
     """Return limits, -inf for each `none`."""
-    words = [word.strip() for word in listed.split(",")]
+    words = [word.strip().lower() for word in listed.split(",")]
     if len(words) != count:
         raise ValueError(
             f"limits must have a number or none for each of {count} objectives, not {len(words)}: {listed}"
@@ -189,7 +213,10 @@ def _number(options: Mapping[str, str], name: str, most: float = math.inf) -> fl
     """Return the number of an option; 0 without it."""
     if name not in options:
         return 0.0
-    [number] = _numbers(options[name], name, 1)
+    try:
+        [number] = [float(word) for word in options[name].split(",")]
+    except ValueError:
+        raise ValueError(f"{name} must be one number, not {options[name]!r}") from None
     if not 0 <= number <= most:
         allowed = "at least 0" if most == math.inf else f"from 0 to {most:g}"
         raise ValueError(f"{name} must be {allowed}, not {number:g}")

@@ -97,6 +97,11 @@ def test_terminal_and_script(objectives_of, tmp_path):
     assert isinstance(user, ScriptedUser) and user.path == log
 
 
+def test_no_limit_may_be_written_as_one_likes(objectives_of):
+    user = make_user("A,limits=None,-45", objectives_of(2))
+    assert user.utility(np.array([[-900.0, -45.0], [-1.0, -45.5]])).argmax() == 0
+
+
 @pytest.mark.parametrize("spec", ["A", "weights=1,2,3", "weights=1,2,chebyshev", "target=1", "terminal"])
 def test_without_a_known_number_of_objectives_any_number_passes(spec):
     assert callable(parse_user(spec, None))
@@ -109,13 +114,13 @@ def test_without_a_known_number_of_objectives_any_number_passes(spec):
         ("", 2, "unknown user ''"),
         ("a", 2, "unknown user 'a'"),
         ("A=1", 2, "unknown user 'A=1'"),
-        ("weights", 2, "unknown user 'weights'"),
-        ("target", 2, "unknown user 'target'"),
+        ("weights", 2, "user weights has no value; write weights=W1,W2,..."),
+        ("target", 2, "user target has no value; write target=Z1,Z2,..."),
         ("terminal=1", 2, "unknown user 'terminal=1'"),
         ("A", 3, "user A has weights for two objectives, but there are 3; write weights=W1,W2"),
         ("weights=1,2,3", 2, "weights must have one number for each of 2 objectives, not 3: 1,2,3"),
         ("weights=1", 2, "weights must have one number for each of 2 objectives, not 1: 1"),
-        ("weights=", None, "weights must be numbers separated by commas, but '' is none"),
+        ("weights=", None, "user weights has no value"),
         ("weights=1,x", None, "but 'x' is none"),
         ("weights=0.5;0.5", None, "but '0.5;0.5' is none"),
         ("weights=1,nan", None, "weights must be finite numbers, but 'nan' is not"),
@@ -133,6 +138,10 @@ def test_without_a_known_number_of_objectives_any_number_passes(spec):
         ("weights=1,2,concave=1,2,3,4,chebyshev", 2, "either chebyshev or concave"),
         ("weights=1,2,limits=3", 2, "limits must have a number or none for each of 2 objectives, not 1: 3"),
         ("weights=1,2,limits=3,nothing", 2, "limits must be numbers separated by commas, but 'nothing' is none"),
+        ("A,random=0.2,0.3", 2, "random must be one number, not '0.2,0.3'"),
+        ("A,temperature=abc", 2, "temperature must be one number, not 'abc'"),
+        ("A,before=1,0,until=0", 2, "until=GENERATION, a whole number from 1"),
+        ("weights=-1,2,random=2,until=x", 2, "not be negative.*; random must be.*; until must be one number"),
         ("A,random=2", 2, "random must be from 0 to 1, not 2"),
         ("A,temperature=-1", 2, "temperature must be at least 0, not -1"),
         ("A,before=1,2", 2, "needs before=W1,W2,... and until=GENERATION"),
@@ -155,7 +164,6 @@ def test_problems(spec, objectives, problem):
     ("value", "problem"),
     [
         ("nowhere.jsonl", "there is no decision log 'nowhere.jsonl': .*/nowhere.jsonl is not a file"),
-        ("", "there is no decision log ''"),
         ("/", "there is no decision log '/': / is not a file"),
     ],
 )
