@@ -18,7 +18,16 @@ from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_scatter, front_table
-from jmorl.display.text import REASONS, duration, number, number_format, plural, short_count, values_in_words
+from jmorl.display.text import (
+    REASONS,
+    confirmed_in_words,
+    duration,
+    number,
+    number_format,
+    plural,
+    short_count,
+    values_in_words,
+)
 from jmorl.events import Event, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.report.watchers import Watcher, show_result
@@ -79,6 +88,9 @@ class LiveView(Watcher):
         if isinstance(event, RunFinished):
             self._live.stop()  # the panel stays as it is, above the result
             show_result(self.console, event, self.objectives)
+            found = confirmed_in_words(event.chosen, self.objectives)
+            if found:
+                self.console.print(f"The result is policy {event.chosen.id}: {found}.")
 
     def _new(self) -> Live:
         """One that has drawn nothing yet: one that was stopped would draw over what came since."""

@@ -110,10 +110,22 @@ def decisions_table(run: StoredRun) -> PlainTable:
         if isinstance(record, DecisionRecord):
             cells = [f"{value:{fmt}}" for value, fmt in zip(record.values, formats, strict=True)]
             among = str(len(record.shown)) if record.shown else ""
-            more = f"go on for {plural(record.generations, 'generation')}" if record.generations > 1 else ""
-            note = "by the stand-in" if record.stand_in else "stop" if record.stop else more
-            table.add_row(str(record.generation), record.purpose, among, str(record.policy), *cells, note)
+            question = f"{record.purpose}, again" if record.again else record.purpose
+            table.add_row(str(record.generation), question, among, str(record.policy), *cells, _kind_of_answer(record))
     return table
+
+
+def _kind_of_answer(record: DecisionRecord) -> str:
+    """Say what there is of an answer besides the policy that the run went on with."""
+    known = {
+        "by the stand-in": record.stand_in,
+        "no difference": record.equal,
+        f"in the order {' '.join(map(str, record.ranking))}": record.ranking,
+        f"go on for {plural(record.generations, 'generation')}": record.generations > 1,
+        f"limits {' '.join('none' if each is None else f'{each:g}' for each in record.limits or ())}": record.limits,
+        "stop": record.stop,
+    }
+    return ", ".join(text for text, applies in known.items() if applies)
 
 
 def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> PlainTable:

@@ -14,7 +14,8 @@ class SearchConfig(Section):
 
     delta: NonNegative = Field(0.1, description="slack of the bounds, z - delta sqrt(s |z|)")
     bounds_scale: Literal["range", "one"] = Field(
-        "range", description="s in the bounds: the archive's range of each objective, or 1 (the paper)"
+        "range",
+        description="s in the bounds: the archive's range of each objective, or 1 (the paper, in its own units)",
     )
     least_slack: NonNegative = Field(
         0.02, description="slack of the bounds at least, as a share of the archive's range; 0: none (the paper)"
@@ -28,7 +29,8 @@ class SearchConfig(Section):
         description="interactive: share of the tasks that train scouts while the choice stays; 0: none (the paper)",
     )
     gain_within: Literal["bounds", "front"] = Field(
-        "bounds", description="interactive: measure gains inside the bounds, or over the whole front (the paper)"
+        "bounds",
+        description="interactive: measure gains inside the bounds, or over the whole front (the paper, its own units)",
     )
     value_scale: Literal["range", "none"] = Field(
         "range", description="search in values scaled by the archive's range, or in values less the reference point"

@@ -85,7 +85,8 @@ def read_run(path: Path | str) -> StoredRun:
     path = Path(path)
     layout = Layout(path)
     if not layout.manifest.exists() or not layout.metrics.exists():
-        raise StoredRunError(f"{path} is not a run folder, or its run ended in the warm-up")
+        why = "is not a run folder, or its run ended in the warm-up" if path.exists() else "does not exist"
+        raise StoredRunError(f"{path} {why}")
     with _reading(layout.root, " as a run"):
         manifest = read_manifest(path)
         config = resolve(file=layout.config)

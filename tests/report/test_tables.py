@@ -98,9 +98,18 @@ def test_a_row_for_every_decision(make_run):
 
 
 @pytest.mark.parametrize(
-    ("changes", "note"), [({"stop": True}, "stop"), ({"generations": 3}, "go on for 3 generations"), ({}, "")]
+    ("changes", "note"),
+    [
+        ({"stop": True}, "stop"),
+        ({"generations": 3}, "go on for 3 generations"),
+        ({"equal": True}, "no difference"),
+        ({"ranking": (2, 1)}, "in the order 2 1"),
+        ({"limits": (None, -45.0)}, "limits none -45"),
+        ({"stand_in": True}, "by the stand-in"),
+        ({}, ""),
+    ],
 )
-def test_a_decision_may_say_what_comes_next(make_run, changes, note):
+def test_a_decision_may_say_more_than_a_policy(make_run, changes, note):
     from dataclasses import replace
 
     run = make_run()
