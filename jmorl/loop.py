@@ -150,6 +150,8 @@ class _Run:
             bounds, silent = self.method.bounds(state.search), self.method.generations_to_question(state.search)
             yield Resumed(state, self._steps(state), bounds, silent)
         while self._budget_left(state) and not self._satisfied(state):
+            if self.decision_maker.wants_question(state.generation + 1):
+                state = replace(state, search=self.method.asking_at_once(state.search))
             while question := self.method.question(state):
                 state, decided = yield from self._decided(state, question)
                 if decided.chosen and question.stops(decided.answer):
@@ -169,7 +171,7 @@ class _Run:
         front = state.archive.members if satisfied else self.method.final_front(state)
         best = finalists(front, None if satisfied else state.choice, self.population.size)
         state, best = self._confirmed(state, best)
-        state, decided = yield from self._decided(state, self._final_question(state, best or front, front))
+        state, decided = yield from self._decided(state, self._final_question(state, best or front))
         assert decided.chosen is not None
         state, [chosen] = self._confirmed(state, [decided.chosen])
         yield RunFinished(state, chosen, "satisfied" if satisfied else "budget")
@@ -272,13 +274,13 @@ class _Run:
         state = replace(state, evaluation_steps=state.evaluation_steps + steps)
         return state, [by_id.get(policy.id, policy) for policy in policies]
 
-    def _final_question(self, state: RunState, shown: Sequence[Policy], front: Sequence[Policy]) -> Question:
-        """Return the last question, which shows some of a front."""
+    def _final_question(self, state: RunState, shown: Sequence[Policy]) -> Question:
+        """Return the last question, which shows some of the archive: any other policy may be chosen, too."""
         previous = state.choice.id if state.choice else None
         bounds = self.method.bounds(state.search)
         objectives, limits = self.method.problem.objectives, self.method.limits(state.search)
         ids = [policy.id for policy in shown]
-        others = tuple(policy for policy in front if policy.id not in ids)
+        others = tuple(policy for policy in state.archive.members if policy.id not in ids)
         return Question(
             "final", state.generation + 1, objectives, tuple(shown), bounds, previous, others, limits=limits
         )

@@ -74,8 +74,8 @@ class Question(AnyQuestion):
 
     `purpose` is "steer" at the start of a generation and "final" at the end of a run, when the
     answer is the run's result. `front` has at least one member; at the end of an interactive run
-    it holds those within the bounds. "enautilus": which of the policies that the points of E-NAUTILUS
-    head for, see `DecisionMaker.choose_point`; "pair": which of two, see `DecisionMaker.compare`.
+    it holds those within the bounds, and `others` the rest. "enautilus": which of the policies that the
+    points of E-NAUTILUS head for, see `DecisionMaker.choose_point`; "pair": which of two, see `DecisionMaker.compare`.
 
     `form` is what is wanted: the "best" of those shown; the better one of a "pair"; or to "rank" those shown from the
     best down. Whatever the form, the best one is answer enough.
@@ -90,6 +90,7 @@ class Question(AnyQuestion):
     others: tuple[Policy, ...] = ()  # that may be chosen, too, but are shown only if somebody wants to see them
     form: Form = "best"
     limits: tuple[float, ...] | None = None  # [M] that somebody has set, -inf where there is none; None: never any
+    previous_by_stand_in: bool = False  # the policy chosen last was a stand-in's choice
     again: bool = False  # the second question about one choice, see `DecisionMaker.follow_up`
 
     @property
@@ -298,6 +299,10 @@ class DecisionMaker(ABC):
 
     def remembers(self, question: AnyQuestion) -> bool:
         """Return whether this question was answered before, so that the answer is given again without asking."""
+        return False
+
+    def wants_question(self, generation: int) -> bool:
+        """Return whether to ask before this generation, though an earlier answer was to hold until later."""
         return False
 
     def compare(self, question: PairQuestion) -> int | None:

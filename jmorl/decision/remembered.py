@@ -44,6 +44,12 @@ class Remembered(Wrapper):
         whole = question.whole if isinstance(question, Question) else question  # which somebody may have seen
         return bool(self.records) and (is_of(self.records[0], question) or is_of(self.records[0], whole))
 
+    def wants_question(self, generation: int) -> bool:
+        """Return whether the next record is of this generation, or the user wants to be asked."""
+        if self.records:
+            return self.records[0].generation == generation
+        return self.user.wants_question(generation)
+
 
 def is_of(record: RunRecord, question: AnyQuestion) -> bool:
     """Return whether the record is an answer to this question."""

@@ -76,6 +76,11 @@ class ScriptedUser(DecisionMaker):
         others = tuple(policy for row, policy in enumerate(policies) if row not in rows)
         return replace(question.whole, front=tuple(policies[row] for row in rows), others=others, again=True)
 
+    def wants_question(self, generation: int) -> bool:
+        """Return whether the log has an answer that somebody gave themselves before this generation."""
+        record = self._steering.get((generation, 0))
+        return record is not None and not record.stand_in
+
     def choose_point(self, question: PointQuestion) -> PointAnswer:
         """Return the answer to a question of E-NAUTILUS."""
         record = self._points.get((question.generation, question.number))

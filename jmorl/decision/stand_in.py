@@ -33,9 +33,10 @@ class StandIn(Wrapper):
     It is sure where its expected regret is small (`TRUSTED_REGRET`); with `ask` "always", or for a patient user, it
     never is. With `shows` "few" it asks about few policies at a time: the best by expectation, the one that was chosen
     last, and those whose comparison tells most; with "rank" for their order; with "pair" about two, after which it goes
-    on with the best by expectation. `history` has the records of a run that goes on; only what the user said themselves
-    counts. The same answers give the same posterior. With `ask_now` it leaves the next question to the user, however
-    sure it is: so somebody takes back what it has answered.
+    on with the best by expectation, and at the end about few: the result is what the user chooses. `history` has the
+    records of a run that goes on; only what the user said themselves counts. The same answers give the same posterior.
+    With `ask_now` it leaves the next question to the user, however sure it is: so somebody takes back what it has
+    answered.
     """
 
     def __init__(
@@ -49,12 +50,15 @@ class StandIn(Wrapper):
     ):
         super().__init__(user)
         self.seed = seed
+        history = list(history)
         own = [each for each in history if isinstance(each, DecisionRecord) and not by_stand_in(each)]
         self.answers = [answer for answer in map(_said, own) if answer]
         self.limits = next((each.answer.limits for each in reversed(own) if each.limits), None)
         self.ask = "always" if user.patient else ask
         self.shows = shows
         self.ask_now = ask_now
+        decisions = [each for each in history if isinstance(each, DecisionRecord)]
+        self.chose_last = bool(decisions) and by_stand_in(decisions[-1])
 
     def decide(self, question: AnyQuestion) -> tuple[AnyQuestion, Any]:
         """Return the question as it was asked, and the answer.
@@ -63,21 +67,25 @@ class StandIn(Wrapper):
         """
         if not isinstance(question, Question) or question.purpose not in TRUSTED_REGRET:
             return question, self.user.respond(question)
+        question = replace(question, previous_by_stand_in=self.chose_last)
         if question.again:
             return self._asked(question)
         if len(question.front) == 1 and self.ask == "unsure" and self._reachable(question):
+            self.chose_last = True
             return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
         model = self._model(question)
         verdict = model.verdict()
         asked = self._shortened(question, model, verdict)
         if self._is_sure(question, verdict) and not self.ask_now and not self.user.remembers(asked):
-            reason = f"the answers so far agree on it: expected regret {verdict.regret:.1%} of the range of utility"
+            reason = f"your earlier answers speak for it, and expect a loss of {verdict.regret:.1%} of the range"
+            self.chose_last = True
             return question, Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
         self.ask_now = False
         return self._asked(asked)
 
     def _asked(self, asked: Question) -> tuple[Question, Answer]:
         """Ask the user, and take note of what they say. Return the question as they saw it, and the answer."""
+        self.chose_last = False
         answer: Answer = self.user.respond(asked)
         if asked.form == "best" and not answer.equal and not _is_shown(asked, answer.policy):
             asked = asked.whole  # which they wanted to see
@@ -90,6 +98,12 @@ class StandIn(Wrapper):
             whole = asked.whole
             answer = replace(answer, policy=whole.front[self._model(whole).verdict().best].id)
         return asked, answer
+
+    def wants_question(self, generation: int) -> bool:
+        """Return whether the user wants to be asked before this generation; then nobody answers for them."""
+        wanted = self.user.wants_question(generation)
+        self.ask_now = self.ask_now or wanted
+        return wanted
 
     def follow_up(self, question: AnyQuestion, answer: Any) -> AnyQuestion | None:
         """Return the question whether an answer was meant so, where the user's other answers speak for another policy.
@@ -128,16 +142,17 @@ class StandIn(Wrapper):
 
     def _shortened(self, question: Question, model: PreferenceModel, verdict: Verdict) -> Question:
         """Return the question in the form wanted, about a few policies; the others may be chosen, too."""
-        if self.shows == "front" or len(question.front) == 1:
+        shows = "few" if self.shows == "pair" and question.purpose == "final" else self.shows
+        if shows == "front" or len(question.front) == 1:
             return question
-        if self.shows == "pair":
+        if shows == "pair":
             rows = model.sampled_pair()
         else:
             ids = [policy.id for policy in question.front]
             previous = [ids.index(question.previous)] if question.previous in ids else []
             rows = model.telling(FEW, [verdict.best, *previous])
         few = tuple(question.front[row] for row in rows)
-        return replace(question, front=few, others=_without(question.whole.front, few), form=FORMS[self.shows])
+        return replace(question, front=few, others=_without(question.whole.front, few), form=FORMS[shows])
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""

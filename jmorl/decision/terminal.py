@@ -14,16 +14,19 @@ from jmorl.display.console import PlainConsole
 
 LONGEST_NUMBER = 9  # digits
 POLICY_HELP = """\
+A policy is one way to act that was trained. Its scores are means over episodes, ± their spread from episode to episode;
+more is better, so of two below zero the one nearer to it. Training goes on around your choice: it looks for nothing
+that is much worse. To choose otherwise later: jmorl branch RUN --generation K --out NEW.
   12           choose policy 12
-  Enter        keep your last choice: none of these is better
+  Enter        keep the last choice: none of these is better
   12 4 9       prefer policy 12, then 4, then 9, to all others
   same         no difference between these
   {limit}
                rule out what does not reach this; none takes it back
   {more:<12} list the policies with the most of an objective first
   all          list every policy, where only some are shown; the others can be chosen, too
-  12 go 5      choose policy 12, then no question for 5 generations (or go 5)
-  12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)
+  12 go 5      choose policy 12, then no question for 5 rounds (or go 5)
+  12 q         choose policy 12 and end (q or Ctrl-D: with the last choice)
   ?            this help"""
 POINT_HELP = """\
   2            move to point 2: nothing will ever be worse than its worst values
@@ -50,7 +53,7 @@ class TerminalUser(DecisionMaker):
         show_front(self.console, question, by=0)
         limits = question.limits
         while True:
-            line = self._line("policy (? for help) > ")
+            line = self._line(_prompt(question))
             if line and line.strip().lower() == "all":
                 question = question.whole
                 show_front(self.console, question, by=0)
@@ -93,12 +96,22 @@ class TerminalUser(DecisionMaker):
         self.console.print(sentence)
 
 
+def _prompt(question: Question) -> str:
+    """Say what to type."""
+    ids = [str(policy.id) for policy in question.front]
+    if question.form == "rank":
+        return f"policies, the best first, for example {' '.join(ids[:3])} (? for help) > "
+    if question.form == "pair":
+        return f"{' or '.join(ids[:2])}, or same (? for help) > "
+    return "policy (? for help) > "
+
+
 def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, ...] | str:
     """Return what a line means: an answer, an objective's index to list by, limits, or a sentence to say and ask again.
 
     Limits [M] are those from now on, -inf where there is none.
     """
-    words = line.lower().split()
+    words = line.lower().replace("−", "-").replace(",", " ").replace(">", " ").split()
     name = question.objectives[-1].name
     middle = f"{float(np.median(question.values[:, -1])):.3g}"
     if words[:1] in (["?"], ["help"]):
@@ -126,9 +139,9 @@ def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, .
         case ["go", number] if question.purpose == "steer" and (generations := _number(number)):
             return Answer(chosen, generations=generations, ranking=ranking)
         case ["go", *_] if question.purpose == "steer":
-            return "Say for how many generations to go on, for example: go 5"
+            return "Say for how many rounds to go on, for example: go 5"
         case ["go", *_]:
-            return "The run has no generations left to go on for; choose the policy that is its result."
+            return "The run has no rounds left to go on for; choose the policy that is its result."
     return f"I do not understand {line.strip()!r}; ? lists what you can type."
 
 

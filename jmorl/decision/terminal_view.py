@@ -25,10 +25,13 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
         by=by,
         bounds=question.bounds,
         limits=question.limits,
+        previous_name="chosen for you" if question.previous_by_stand_in else "last choice",
     )
     fresh = next((policy.confirmation.episodes for policy in question.front if policy.confirmation), 0)
     if fresh:
         heading += f"\nThese scores are new, from {plural(fresh, 'fresh episode')}."
+    if question.form == "pair" and question.purpose == "steer":
+        heading += "\nTraining then goes on from the policy that all your answers so far speak for."
     told = limits_in_words(question)
     if told:
         heading += f"\n{told}"
@@ -36,7 +39,8 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
         heading += f"\nType all to see {len(question.others)} more."
     _show(console, heading, table)
     chosen = [policy.values for policy in question.front if policy.id == question.previous]
-    marks, legend = ({"x": chosen[0]}, "o: a policy, x: your last choice") if chosen else ({}, "o: a policy")
+    by_whom = "chosen for you" if question.previous_by_stand_in else "your last choice"
+    marks, legend = ({"x": chosen[0]}, f"o: a policy, x: {by_whom}") if chosen else ({}, "o: a policy")
     show_plot(console, question.objectives, question.values, marks, legend)
 
 

@@ -27,6 +27,10 @@ class Wrapper(DecisionMaker):
         """Return whether the user has answered this question before."""
         return self.user.remembers(question)
 
+    def wants_question(self, generation: int) -> bool:
+        """Return whether the user wants to be asked before this generation."""
+        return self.user.wants_question(generation)
+
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
         answer: Answer = self.respond(question)

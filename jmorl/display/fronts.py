@@ -27,6 +27,7 @@ def front_table(
     by: int = 0,
     bounds: np.ndarray | None = None,
     limits: Sequence[float] | None = None,
+    previous_name: str = "last choice",
 ) -> PlainTable:
     """One row for each of at least one policy, the most of objective `by` first.
 
@@ -42,7 +43,7 @@ def front_table(
     table = PlainTable("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
-        role = {policy.id == previous_id: "last choice", policy.id == chosen_id: "chosen"}.get(True)
+        role = {policy.id == previous_id: previous_name, policy.id == chosen_id: "chosen"}.get(True)
         notes = role, _origin(policy), _outside(bool(bounded[index]), bool(good[index]))
         table.add_row(
             str(policy.id),

@@ -66,7 +66,7 @@ def plural(count: int, noun: str) -> str:
 
 def front_question(purpose: str, generation: int, policies: int, form: str = "best", again: bool = False) -> str:
     """Return the question about a front of so many policies; the other parameters are a Question's."""
-    when = "The run is over." if purpose == "final" else f"Generation {generation}."
+    when = "The run is over." if purpose == "final" else f"Round {generation}."
     if again:
         return f"{when} Your earlier answers speak for the other one of these two. Which one do you prefer?"
     if form == "pair":
@@ -78,7 +78,7 @@ def front_question(purpose: str, generation: int, policies: int, form: str = "be
             f"Which of these {policies} policies is its result?" if policies > 1 else "Is this policy its result?"
         )
     which = f"which of these {policies} policies do you prefer?" if policies > 1 else "do you go on with this policy?"
-    return f"Generation {generation}: {which}"
+    return f"Round {generation}: {which}"
 
 
 def objective_label(objective: Objective) -> str:

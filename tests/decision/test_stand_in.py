@@ -317,6 +317,29 @@ def test_a_ranked_pair_is_the_same_as_the_better_one(growing):
     ]
 
 
+def test_the_last_question_is_about_few_and_its_answer_is_the_result(growing):
+    """Nobody ends a run with a policy that they have not chosen, or not seen."""
+    last = replace(growing(6)[-1], purpose="final")
+    for index in range(5):
+        user = Says(lambda question, index=index: Answer(question.front[min(index, len(question.front) - 1)].id))
+        stand_in: Any = StandIn(user, 1, ask="always", shows="pair")
+        live(stand_in, growing(5))
+        asked, answer = stand_in.decide(last)
+        assert asked.form == "best" and len(asked.front) == 5 and answer.policy == asked.front[index].id
+
+
+def test_a_question_says_whether_the_last_choice_was_a_stand_ins(growing):
+    user = Says(chooses)
+    stand_in = StandIn(user, 1, ask="unsure")
+    decided, _ = live(stand_in, growing(8))
+    own = [not answer.stand_in for _, answer in decided]
+    assert False in own and own.count(True) > 1
+    asked = [question.previous_by_stand_in for question in user.questions if not question.again]
+    assert asked == [index > 0 and not own[index - 1] for index in range(len(own)) if own[index]]
+    later: Any = StandIn(Says(chooses), 1, written(decided[: own.index(False) + 1]), ask_now=True)
+    assert later.decide(growing(9)[-1])[0].previous_by_stand_in
+
+
 def test_none_of_a_pair_keeps_the_last_choice_and_speaks_for_it(ask):
     line = [[k, 9 - k] for k in range(10)]
 

@@ -12,7 +12,7 @@ from jmorl.decision import enautilus as en
 from jmorl.decision.answers import Adjust, Answer, Back, Choose
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.protocol import PointQuestion
-from jmorl.decision.terminal import TerminalUser
+from jmorl.decision.terminal import TerminalUser, policy_reply
 from jmorl.display.console import PlainConsole
 
 # Policies 10, 11, 12 in the tests below.
@@ -102,7 +102,7 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
         ("12 99 98", "Only the policies shown can be put in order. Not shown: 99, 98."),
         ("12 10 now", "I do not understand '12 10 now'"),
         ("same same", "I do not understand 'same'"),
-        ("12 10 go", "Say for how many generations"),
+        ("12 10 go", "Say for how many rounds"),
         ("limit", LIMIT),
         ("limit fuel", LIMIT),
         ("limit 5", LIMIT),
@@ -112,10 +112,10 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
         ("limit fuel inf", "A limit is a number, or none; 'inf' is neither."),
         ("12 q now", "I do not understand '12 q now'"),
         ("q 12", "I do not understand 'q 12'"),
-        ("go", "Say for how many generations to go on, for example: go 5"),
-        ("go 0", "Say for how many generations"),
-        ("12 go -3", "Say for how many generations"),
-        ("12 go x", "Say for how many generations"),
+        ("go", "Say for how many rounds to go on, for example: go 5"),
+        ("go 0", "Say for how many rounds"),
+        ("12 go -3", "Say for how many rounds"),
+        ("12 go x", "Say for how many rounds"),
         ("99 go 5", "There is no policy 99"),
         ("more", "More of what? Name one of the objectives: 1 time, 2 fuel. For example: more time"),
         ("more speed", "More of what?"),
@@ -147,6 +147,13 @@ def test_the_input_ending_before_any_choice_is_an_error_not_a_loop(ask):
         Session("what?").user.answer(ask(VALUES))
 
 
+def test_numbers_may_be_written_as_people_write_them(ask):
+    question = ask([[-70, -40], [-60, -50], [-50, -60]])
+    for line in ("12, 10, 11", "12 > 10 > 11", "12 10 11"):
+        assert policy_reply(question, line) == Answer(12, ranking=(12, 10, 11))
+    assert policy_reply(question, "limit 2 −45") == (-np.inf, -45.0)
+
+
 def test_undecodable_input_gets_the_help(ask):
     session = Session()
 
@@ -155,7 +162,7 @@ def test_undecodable_input_gets_the_help(ask):
         return b"\xff".decode() if len(session.prompts) == 1 else "12"
 
     assert TerminalUser(session.user.console, read).answer(ask(VALUES)) == Answer(12)
-    assert "keep your last choice" in session.output
+    assert "keep the last choice" in session.output
 
 
 @pytest.mark.parametrize("line", ["?", "help"])
@@ -164,13 +171,13 @@ def test_help(ask, line):
     session.user.answer(ask(VALUES))
     for text in (
         "  12           choose policy 12\n",
-        "  Enter        keep your last choice: none of these is better\n",
+        "  Enter        keep the last choice: none of these is better\n",
         "  12 4 9       prefer policy 12, then 4, then 9, to all others\n",
         "  same         no difference between these\n",
         "  limit fuel -40\n               rule out what does not reach this; none takes it back\n",
         "  more fuel    list the policies with the most of an objective first\n",
-        "  12 go 5      choose policy 12, then no question for 5 generations (or go 5)\n",
-        "  12 q         choose policy 12 and end (q or Ctrl-D: with your last choice)\n",
+        "  12 go 5      choose policy 12, then no question for 5 rounds (or go 5)\n",
+        "  12 q         choose policy 12 and end (q or Ctrl-D: with the last choice)\n",
     ):
         assert text in session.output
 
@@ -266,10 +273,10 @@ def test_a_limit_survives_a_look_at_all_policies(ask):
 @pytest.mark.parametrize(
     ("purpose", "form", "again", "heading"),
     [
-        ("steer", "pair", False, "Generation 4. Which one of these two policies do you prefer?"),
+        ("steer", "pair", False, "Round 4. Which one of these two policies do you prefer?"),
         ("final", "pair", False, "The run is over. Which one of these two policies do you prefer?"),
-        ("steer", "rank", False, "Generation 4. In which order do you prefer these 2 policies?"),
-        ("steer", "best", True, "Generation 4. Your earlier answers speak for the other one of these two. Which one"),
+        ("steer", "rank", False, "Round 4. In which order do you prefer these 2 policies?"),
+        ("steer", "best", True, "Round 4. Your earlier answers speak for the other one of these two. Which one"),
         ("final", "best", True, "The run is over. Your earlier answers speak for the other one of these two."),
     ],
 )
@@ -291,7 +298,7 @@ def test_an_ambiguous_objective_is_asked_for_again(ask):
 def test_what_the_question_shows(ask):
     session = Session("10")
     session.user.answer(ask(VALUES, generation=4, previous=11, bounds=[-90, -60]))
-    assert "Generation 4: which of these 3 policies do you prefer?" in session.output
+    assert "Round 4: which of these 3 policies do you prefer?" in session.output
     for text in ("time label", "(time unit)", "fuel label", "(fuel unit)"):
         assert text in session.output
     [table] = tables_shown(session)
@@ -346,7 +353,7 @@ def test_the_final_question(ask):
     session = Session("go 5", "12 go 5", "12")
     assert session.user.answer(ask(VALUES, purpose="final", previous=11)) == Answer(12)
     assert "The run is over. Which of these 3 policies is its result?" in session.output
-    assert session.sentences.count("The run has no generations left to go on for") == 2
+    assert session.sentences.count("The run has no rounds left to go on for") == 2
     assert Session("").user.answer(ask(VALUES, purpose="final", previous=11)) == Answer(11)
 
 
@@ -432,7 +439,7 @@ def test_a_whole_dialogue(front_of, objectives_of):
 def test_a_front_of_one_policy_is_no_choice_among_policies(ask):
     session = Session("10")
     session.user.answer(ask([[1, 2]], generation=4))
-    assert "Generation 4: do you go on with this policy?" in session.output
+    assert "Round 4: do you go on with this policy?" in session.output
     session = Session("10")
     session.user.answer(ask([[1, 2]], purpose="final"))
     assert "The run is over. Is this policy its result?" in session.output
