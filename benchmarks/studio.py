@@ -92,12 +92,14 @@ class Still(Session):
             question=question,
         )  # fmt: skip
 
-    def _think(self, question: Question | None, policy: int) -> None:
+    def work_out(self, policy: int) -> None:
+        """Make up what choosing a policy would mean."""
         values = self.view.values
         bounds = values[policy] - 100
         expected = values[policy] + np.random.default_rng(policy).normal(size=(40, values.shape[1])) * 50
         prospect = Prospect(bounds, (values >= bounds).all(axis=1), expected, odds=0.25)
-        self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: prospect}))
+        if policy not in self.prospects:
+            self.prospects = {**self.prospects, policy: prospect}
 
     def history(self) -> tuple[()]:
         """Return no branches."""
@@ -155,12 +157,12 @@ def question(folder: Path) -> list[float]:
     waited = []
     run = str(folder / "question")
     with served("jmorl.cli", "studio", "--out", run, "--port", str(PORT)), browser_page() as page:
-        page.get_by_text("Generation 1: which of these").wait_for(timeout=300_000)
+        page.get_by_text("Round 1: which of these").wait_for(timeout=300_000)
         for generation in range(2, 7):
             page.locator(".policies-row").first.click()
             page.locator(".place.focus .choose").wait_for()
             page.wait_for_timeout(1000)
-            waited.append(float(page.evaluate(CHOOSE, f"Generation {generation}: which of these")))
+            waited.append(float(page.evaluate(CHOOSE, f"Round {generation}: which of these")))
     return (np.array(waited) - _seconds(folder / "question")[: len(waited)]).tolist()
 
 

@@ -197,6 +197,7 @@ def _add_continuing(commands: Any) -> None:
     )
     branch.add_argument("--out", type=to_path, required=True, metavar="FOLDER", help="folder of the new run")
     branch.add_argument("--user", help="who decides from then on, as in train (default: the run's own user)")
+    branch.add_argument("--steps", type=_count, metavar="N", help="budget of steps, those before the branch included")
     branch.add_argument("--force", action="store_true", help="overwrite the run that is in the folder")
     _add_output(branch)
 

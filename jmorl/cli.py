@@ -114,7 +114,8 @@ def _branch(options: argparse.Namespace) -> None:
     from jmorl.storage.resume import branch
 
     _check_json(options, options.user or _stored_user(options.run))
-    _follow(branch(options.run, options.generation, options.out, options.user, options.force), options)
+    continued = branch(options.run, options.generation, options.out, options.user, options.force, options.steps)
+    _follow(continued, options)
 
 
 def _begun(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> "Continued":

@@ -14,7 +14,7 @@ from jmorl.storage.lock import FolderInUse
 from jmorl.storage.policy_file import load_policy
 from jmorl.storage.resume import CannotContinue, branch, resume
 from tests.probes import ThreeWays
-from tests.resuming import Counting, follow, go_on, outcome, train
+from tests.resuming import Counting, follow, go_on, outcome, timeless, train
 
 
 def test_a_branch_shares_the_past_and_decides_for_itself(whole, tmp_path):
@@ -52,9 +52,19 @@ def test_a_branch_asks_at_once(whole, small_config, tmp_path):
     assert user.asked[0] == ("steer", 2)
 
 
+def test_a_branch_at_the_end_goes_on_with_more_steps(whole, small_config, tmp_path):
+    before = outcome(whole)
+    each = small_config.population.iterations * small_config.steps_per_iteration
+    path = follow(branch(whole, 3, tmp_path / "longer", steps=small_config.steps + 2 * each))
+    metrics = [timeless((folder / "metrics.csv").read_text()) for folder in (whole, path)]
+    assert metrics[1][: len(metrics[0])] == metrics[0] and len(metrics[1]) == len(metrics[0]) + 2
+    assert outcome(whole) == before
+
+
 @pytest.mark.parametrize(
     ("how", "error", "message"),
     [
+        ({"generation": 3, "steps": 2000}, CannotContinue, "had used 2112 steps by then; give the branch more"),
         ({"generation": 9}, CannotContinue, "has no checkpoint of generation 9, only of: 0, 1, 2, 3"),
         ({"out": "used"}, FolderInUse, "used is not empty, and not a run"),
     ],
@@ -64,7 +74,7 @@ def test_a_branch_that_cannot_be_made_says_why_and_makes_nothing(whole, tmp_path
     (tmp_path / "used" / "letter").touch()
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(error, match=message):
-        branch(whole, how.get("generation", 1), tmp_path / how.get("out", "new"))
+        branch(whole, how.get("generation", 1), tmp_path / how.get("out", "new"), steps=how.get("steps"))
     assert sorted(tmp_path.rglob("*")) == before
 
 

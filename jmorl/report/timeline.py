@@ -31,6 +31,11 @@ class Timeline:
         return -((population.warmup_iterations - self.config.iteration_budget) // population.iterations)
 
     @property
+    def left(self) -> int:
+        """How many generations are left, the one that is going on, or is asked about, included."""
+        return max(self.generations - self.generation + 1, 0)
+
+    @property
     def generation_steps(self) -> int:
         """Environment steps of one generation."""
         return self.config.population.iterations * self.config.steps_per_iteration
@@ -86,11 +91,17 @@ class Timeline:
             return None
         return self._seconds(now, min(self.silent - 1, self.generations - self.generation))
 
+    def seconds_of_warmup(self, now: float) -> float | None:
+        """How long the warm-up still takes; None if that is not known."""
+        if self.phase != "warm-up" or not self.compiled:
+            return None
+        return max(self.warmup_steps / self.compiled.steps_per_second - (now - self.since), 0.0)
+
     def seconds_to_end(self, now: float) -> float | None:
         """How long until the end, the time for answers not counted; None if that is not known."""
-        if self.phase == "warm-up" and self.compiled:
-            warmup = self.warmup_steps / self.compiled.steps_per_second
-            return max(warmup - (now - self.since), 0.0) + (self._seconds(now, self.generations) or 0.0)
+        warmup = self.seconds_of_warmup(now)
+        if warmup is not None:
+            return warmup + (self._seconds(now, self.generations) or 0.0)
         if self.phase == "blending":
             return None
         left = max(self.generations - self.generation, -1)

@@ -145,21 +145,30 @@ def blend(path: Path | str, most: int | None = None, population: Population | No
 
 
 def branch(
-    path: Path | str, generation: int, out: Path | str, user: str | None = None, force: bool = False
+    path: Path | str,
+    generation: int,
+    out: Path | str,
+    user: str | None = None,
+    force: bool = False,
+    steps: int | None = None,
 ) -> Continued:
     """Make a new run, in the folder `out`, that begins where a run was after a generation.
 
     It has the earlier run's logs up to there and decides for itself from then on, at once; `user` says who, if not as
-    before. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or has a script
-    that cannot be read, ConfigError; nothing is made then.
+    before, and `steps` how many environment steps it may use, those before it included. Raises CannotContinue,
+    FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or has a script that cannot be read,
+    ConfigError; nothing is made then.
     """
     path, out = Path(path), Path(out)
     manifest, config = read_start(path)
-    config = config.replace(user=user) if user else config
+    config = config.replace(**{"user": user or config.user, "steps": steps or config.steps})
     environment = _environment(config)
     _refuse_to_rescale(path, manifest, environment)
     decision_maker = _new_user(config, environment)
     checkpoint, state = state_after(path, generation, manifest, config, environment)
+    used = state.iterations * config.steps_per_iteration
+    if steps is not None and config.iteration_budget <= state.iterations:
+        raise CannotContinue(f"the run in {path} had used {used} steps by then; give the branch more of them than that")
     method = make_method(config, environment)
     search = method.asking_at_once(state.search)
     state = replace(state, search=method.with_another_user(search) if user else search)

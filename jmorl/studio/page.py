@@ -1,8 +1,8 @@
 """The page: its panels, where they stand, and when they are shown."""
 
-from collections.abc import Callable
+from collections.abc import Callable, MutableMapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from nicegui import ui
 
@@ -10,10 +10,13 @@ from jmorl.studio import texts
 from jmorl.studio.charts.chart_style import BLUE, RED
 from jmorl.studio.panels.between import BetweenPanel
 from jmorl.studio.panels.cards import Cards
+from jmorl.studio.panels.ending import EndingDialog
 from jmorl.studio.panels.front import FrontPanel
 from jmorl.studio.panels.header import Header
 from jmorl.studio.panels.history import HistoryPanel
+from jmorl.studio.panels.introduction import Introduction
 from jmorl.studio.panels.keys import Keys
+from jmorl.studio.panels.limits import LimitsPanel
 from jmorl.studio.panels.navigation import NavigationPanel
 from jmorl.studio.panels.panel import Panel
 from jmorl.studio.panels.parallel import ParallelPanel
@@ -29,6 +32,7 @@ SIDE: dict[str, Callable[[Tab], Panel]] = {
     texts.POLICIES: PolicyTable,
     texts.PROGRESS: ProgressPanel,
     texts.HISTORY: HistoryPanel,
+    texts.LIMITS: LimitsPanel,
     texts.NAVIGATION: NavigationPanel,
     texts.BETWEEN: BetweenPanel,
 }
@@ -38,15 +42,16 @@ KINDS: dict[Tone, Literal["warning", "negative"] | None] = {"hint": None, "warni
 class Page:
     """The panels of one browser tab, and the messages over them."""
 
-    def __init__(self, session: Session):
-        self.tab = tab = Tab(session, self._show, self._tell)
+    def __init__(self, session: Session, kept: MutableMapping[str, Any] | None = None):
+        self.tab = tab = Tab(session, self._show, self._tell, kept)
         ui.add_css(STYLE)
         ui.colors(primary=BLUE, negative=RED)
-        with ui.element("main").classes("studio") as self.root:
+        with ui.element("div").classes("studio") as self.root:
             with ui.element("header").classes("bar"):
                 self.panels: list[Panel] = [Header(tab)]
                 Keys(tab)
-            self.panels.append(QuestionBar(tab))
+            with ui.element("div").classes("top"):
+                self.panels += [Introduction(tab), QuestionBar(tab), EndingDialog(tab)]
             with ui.element("div").classes("charts"):
                 self.panels += [FrontPanel(tab), ParallelPanel(tab)]
             with ui.element("div").classes("side"):

@@ -1,11 +1,14 @@
-"""The policies that are laid out to be compared: the same in every tab, so that a reload loses nothing."""
+"""The policies that somebody at a tab has laid out to compare, and those that a question begins with."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from jmorl.methods.base import Prospect
+from jmorl.search.bounds import within
+from jmorl.search.policy import Policy, values_of
+from jmorl.search.scaling import core, core_scale
 from jmorl.studio.view import View
 
 LETTERS = "ABC"  # of the places
@@ -20,6 +23,7 @@ class Selection:
     more_of: int | None = None  # index of the objective asked for; None: all policies are shown
     than: int | None = None  # the policy that the others are to be better than; None: all are, in order
     prospects: Mapping[int, Prospect] = field(default_factory=dict)  # policy -> what choosing it would mean, if known
+    limits: tuple[float, ...] | None = None  # [M] what each objective must reach, -inf: anything; None: never said
 
     @property
     def letters(self) -> dict[int, str]:
@@ -46,6 +50,14 @@ class Selection:
         focus = next(reversed(left.values()), None) if self.focus == policy else self.focus
         return replace(self, places=left, focus=focus)
 
+    def known_in(self, view: View) -> "Selection":
+        """Return the selection without the policies that are no longer there."""
+        selection = self
+        for policy in self.letters:
+            if not view.policy(policy):
+                selection = selection.without(policy)
+        return selection
+
 
 def wanted(view: View, selection: Selection) -> list[int] | None:
     """Return the policies better in the objective asked for, the least change first; None if none is asked for."""
@@ -55,3 +67,85 @@ def wanted(view: View, selection: Selection) -> list[int] | None:
     least = reference.values[selection.more_of] if reference else -np.inf
     members = sorted(view.front, key=lambda policy: float(policy.values[selection.more_of]))
     return [policy.id for policy in members if policy.values[selection.more_of] > least]
+
+
+def reaching(view: View, selection: Selection) -> np.ndarray:
+    """Return which policies of the front reach the limits that somebody has set, [N] bool."""
+    least = np.full(len(view.objectives), -np.inf) if selection.limits is None else np.array(selection.limits)
+    return within(view.values, least)
+
+
+def listed(view: View, selection: Selection) -> list[int] | None:
+    """Return the policies to look along: those with more of what is asked for, within the limits; None: all are."""
+    more, reach = wanted(view, selection), reaching(view, selection)
+    if more is None and reach.all():
+        return None
+    within_limits = [policy.id for policy, reaches in zip(view.front, reach, strict=True) if reaches]
+    return within_limits if more is None else [policy for policy in more if policy in within_limits]
+
+
+def to_begin_with(view: View, axes: tuple[int, int]) -> Selection:
+    """Lay out what the open question is best begun with: A, in focus, and a policy on either side of it.
+
+    A is the last choice, or what has replaced it. B is better in the objective to the right in the chart, C in the one
+    upwards: the nearest of the new policies, or else of all. Before the first choice A is a compromise, and B and C
+    are the ends of the front. A question about a pair lays out the pair.
+    """
+    assert view.question
+    shown = view.question.front
+    if view.question.form == "pair" or view.question.again:
+        anchor, sides = shown[0], list(shown[1:2])
+    elif view.previous is None:
+        anchor, sides = _compromise(shown), _ends(shown, axes)
+    else:
+        anchor = last_choice(view) or _compromise(shown)
+        sides = _beside(view, shown, anchor, axes)
+    selection = Selection(limits=view.question.limits)
+    for policy in (anchor, *sides):
+        selection = selection.with_policy(policy.id)
+    return replace(selection, places={**selection.places, LETTERS[0]: selection.places[LETTERS[0]]}, focus=anchor.id)
+
+
+def last_choice(view: View) -> Policy | None:
+    """Return the policy chosen last, or the one that has replaced it: nearest of those that are better in everything.
+
+    None before the first choice.
+    """
+    previous = view.previous
+    if previous is None or not view.front or previous.id in {policy.id for policy in view.front}:
+        return previous
+    better = (view.values >= previous.values).all(axis=1)
+    scale = core_scale(view.values)
+    distance = np.linalg.norm(scale.apply(view.values) - scale.apply(previous.values), axis=1)
+    return view.front[int(np.where(better | ~better.any(), distance, np.inf).argmin())]
+
+
+def _compromise(policies: Sequence[Policy]) -> Policy:
+    """Return the policy whose worst objective is best, in shares of the front's range."""
+    values = values_of(policies)
+    return policies[int(core_scale(values).apply(values).min(axis=1).argmax())]
+
+
+def _ends(policies: Sequence[Policy], axes: tuple[int, int]) -> list[Policy]:
+    """Return the best policy in each of two objectives, of those that are not far out."""
+    values = values_of(policies)
+    near = np.flatnonzero(core(values))
+    return [policies[near[values[near, axis].argmax()]] for axis in axes]
+
+
+def _beside(view: View, policies: Sequence[Policy], anchor: Policy, axes: tuple[int, int]) -> list[Policy]:
+    """Return the policy nearest to another one that is better in an objective, for each of two objectives.
+
+    Where none is better, the nearest of the others.
+    """
+    values = values_of(policies)
+    scale = core_scale(values)
+    distances = np.linalg.norm(scale.apply(values) - scale.apply(anchor.values), axis=1)
+    order = sorted(range(len(policies)), key=lambda row: (not view.is_new(policies[row]), distances[row]))
+    found: list[Policy] = []
+    for axis in axes:
+        taken = {anchor.id, *(policy.id for policy in found)}
+        rows = [row for row in order if policies[row].id not in taken]
+        better = [row for row in rows if values[row, axis] > anchor.values[axis]]
+        found += [policies[row] for row in (better or rows)[:1]]
+    return found

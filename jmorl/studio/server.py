@@ -26,12 +26,14 @@ from jmorl.studio.between import blended
 from jmorl.studio.episodes import episode_json
 from jmorl.studio.guard import Guard
 from jmorl.studio.page import Page
+from jmorl.studio.panels.introduction import REMEMBERED
 from jmorl.studio.session import Session
 
 ICON = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="M2 3a11 11 0 0 1 11 11" fill="none" '
     'stroke="#0072B2" stroke-width="2.5"/><circle cx="10" cy="6.5" r="2.6" fill="#E69F00"/></svg>'
 )
+ENGLISH = '<script>document.documentElement.lang = "en";</script>'
 DIAL_STEPS = 300  # of an episode, that are shown of a blend: the dial does not wait for more
 RECORDING = threading.Lock()
 KEPT = "private, max-age=86400"  # an episode never changes
@@ -59,8 +61,10 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
     _add_files(session)
 
     @ui.page("/")
-    def page() -> None:
-        Page(session)
+    async def page() -> None:
+        ui.add_head_html(f"{ENGLISH}{REMEMBERED}")
+        await ui.context.client.connected()  # before that the browser's tab is not known
+        Page(session, app.storage.tab)
 
     serving = threading.Thread(target=_run, args=(host, port), name="server", daemon=True)
     serving.start()

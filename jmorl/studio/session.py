@@ -1,6 +1,6 @@
 """A run beside a page: driven in a thread of its own, shown as immutable records, steered by commands.
 
-The run never waits for anybody but the person who is asked. Whoever shows it reads `view`, `selection` and `dialogue`,
+The run never waits for anybody but the person who is asked. Whoever shows it reads `view`, `prospects` and `dialogue`,
 each replaced as a whole, and compares them by identity with what was shown last. Some commands wait for the generation
 that is going on, and say so.
 """
@@ -8,7 +8,7 @@ that is going on, and say so.
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -19,6 +19,7 @@ from jmorl.decision.answers import Answer, PointAnswer
 from jmorl.decision.protocol import Question
 from jmorl.events import RunFinished
 from jmorl.loop import make_method
+from jmorl.methods.base import Prospect
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
 from jmorl.state import RunState
@@ -32,12 +33,11 @@ from jmorl.studio.between import BlendScore, score
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.history import Branch, free_folder, read_tree
 from jmorl.studio.person import LeftOff, Person
-from jmorl.studio.selection import Selection
 from jmorl.studio.view import PERSON, View, after, stored_view
 
 
 class Session:
-    """The run that is open, and what is laid out of it.
+    """The run that is open, and what its choices would mean.
 
     `background` works out what choosing a policy would mean, one policy after the other; it ends with the session.
     """
@@ -46,10 +46,10 @@ class Session:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, background: Executor | None = None):
         self.clock = clock
-        self.selection = Selection()
+        self.prospects: Mapping[int, Prospect] = {}  # policy -> what choosing it now would mean, as far as known
         self.dialogue: Dialogue | None = None
+        self._worked_out: set[int] = set()  # policies whose prospects are known, or to come
         self.leaving = False  # the run is about to be left, after its generation
-        self._lock = threading.Lock()  # of the selection, which a thread adds to
         self._moving = threading.Lock()  # while one run is left for another
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
@@ -74,34 +74,34 @@ class Session:
         self._thread.start()
 
     def ask(self, question: Question) -> None:
-        """Open a question of the run, and see what is laid out in its light."""
-        self.view = replace(self.view, question=question, bounds=question.bounds)
-        self._rearrange(lambda selection: replace(selection, prospects={}))
-        for policy in self.selection.letters:
-            if self.view.policy(policy):
-                self._think(question, policy)
-            else:
-                self.put_away(policy)
+        """Open a question of the run. Scores that were confirmed for it are those of the front from now on."""
+        asked = {policy.id: policy for policy in question.whole.front}
+        front = tuple(asked.get(policy.id, policy) for policy in self.view.front)
+        self.prospects, self._worked_out = {}, set()
+        self.view = replace(self.view, question=question, bounds=question.bounds, front=front, asking=None)
 
     def answer(self, question: Question, answer: Answer) -> bool:
         """Answer the open question. Return False if it is open no more. Raises ValueError if it has no such policy."""
         return self._person is not None and self._person.reply(question, answer)
 
-    def look_at(self, policy: int) -> None:
-        """Lay a policy out and put it in focus; do nothing if there is none."""
-        if self.view.policy(policy):
-            self._rearrange(lambda selection: selection.with_policy(policy))
-            self._think(self.view.question, policy)
+    def ask_now(self) -> None:
+        """Have the person asked before the next generation, whatever their last answer was to hold for."""
+        if self._person:
+            self._person.ask_now()
+            self.view = replace(self.view, asking="question")
 
-    def put_away(self, policy: int) -> None:
-        """Lay a policy out no longer."""
-        self._rearrange(lambda selection: selection.without(policy))
+    def end_with(self, policy: int) -> None:
+        """End the run after the generation that is going on, with this policy as its result."""
+        if self._person:
+            self._person.end_with(policy)
+            self.view = replace(self.view, asking="end")
 
-    def more_of(self, objective: int | None) -> None:
-        """Ask for more of an objective than the policy in focus, or else the last choice, has; None: no longer."""
-        previous = self.view.previous.id if self.view.previous else None
-        than = self.selection.focus if self.selection.focus is not None else previous
-        self._rearrange(lambda selection: replace(selection, more_of=objective, than=than))
+    def work_out(self, policy: int) -> None:
+        """Find out in the background what choosing the policy would mean; `prospects` has it then."""
+        question, state = self.view.question, self.view.state
+        if question and question.purpose != "final" and state and policy not in self._worked_out:
+            self._worked_out.add(policy)
+            self._background.submit(self._note_prospect, question, state, policy)
 
     def history(self) -> tuple[Branch, ...]:
         """Read the run that is open, and its branches."""
@@ -120,6 +120,20 @@ class Session:
             except Exception:
                 self._show(self.view.path)
                 raise
+
+    def train_on(self, rounds: int) -> None:
+        """Go on where the open run ended, for so many generations more: a branch begins there, and is driven.
+
+        Raises ValueError for a run that has not ended, and as `branch` does.
+        """
+        view = self.view
+        if view.result is None or not view.generations:
+            raise ValueError("this run has not ended; it can go on as it is")
+        with self._move():
+            last, config = view.generations[-1], view.config
+            iterations = round(last.steps / config.steps_per_iteration) + rounds * config.population.iterations
+            steps = iterations * config.steps_per_iteration
+            self.drive(branch(view.path, last.number, free_folder(view.path), PERSON, steps=steps))
 
     def switch(self, run: str) -> None:
         """Open another run of the history. Waits for the generation that is going on; raises as `open` does."""
@@ -218,7 +232,6 @@ class Session:
                     if self.leaving and not isinstance(event, RunFinished):
                         break
             if self.view.result:
-                self.look_at(self.view.result.id)
                 draw_run(read_run(self.view.path), Layout(self.view.path).plots)
         except LeftOff:
             pass
@@ -229,19 +242,13 @@ class Session:
             self.view = replace(self.view, timeline=None, question=None)
 
     def _show(self, path: Path) -> None:
-        """Show what the folder has; of a run that has ended, its result is laid out."""
+        """Show what the folder has."""
+        self.prospects, self._worked_out, self.dialogue = {}, set(), None
         self.view = stored_view(path)
-        self.selection, self.dialogue = Selection(), None
-        if self.view.result:
-            self.look_at(self.view.result.id)
-
-    def _think(self, question: Question | None, policy: int) -> None:
-        """Find out in the background what choosing the policy would mean."""
-        state = self.view.state
-        if question and question.purpose != "final" and state and policy not in self.selection.prospects:
-            self._background.submit(self._note_prospect, question, state, policy)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
+        if self.view.question is not question:  # it is answered: the processors train
+            return
         try:
             chosen = question.policy(policy)
         except ValueError:  # a policy that is looked at, but not to choose from
@@ -249,17 +256,12 @@ class Session:
         config = self.view.config
         found = make_method(config, envs.make(config.env)).prospect(state, chosen)
         if found and self.view.question is question:
-            self._rearrange(lambda selection: replace(selection, prospects={**selection.prospects, policy: found}))
-
-    def _rearrange(self, change: Callable[[Selection], Selection]) -> None:
-        with self._lock:
-            self.selection = change(self.selection)
+            self.prospects = {**self.prospects, policy: found}
 
     def _move_to(self, dialogue: Dialogue) -> None:
-        """Show a dialogue when all that is shown of it is known; at its end keep it, and look at what it led to."""
+        """Show a dialogue when all that is shown of it is known; keep it at its end."""
         if dialogue.chosen:
             keep_dialogue(self.view.path, dialogue.records, dialogue.chosen)
-            self.look_at(dialogue.chosen.id)
         else:
             dialogue.question  # noqa: B018
         self.dialogue = dialogue

@@ -1,11 +1,14 @@
 """One browser tab: the run as the tab shows it, and the commands that its panels give.
 
-All that is shown comes from the session's records. A tab has little of its own: the axes of its chart, the panel open
-at its side, the answer that is being given. It knows no panel and no widget.
+The run comes from the session's records, and an answer goes to the run. A tab has of its own what somebody looks at:
+the policies laid out, the axes of the chart, the panel open at the side, the answer that is being given. It knows no
+panel and no widget.
 """
 
-from collections.abc import Callable
-from typing import Literal, TypeVar
+import math
+from collections.abc import Callable, MutableMapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeVar
 
 from nicegui import run
 
@@ -16,7 +19,7 @@ from jmorl.storage.checkpoints import CheckpointError
 from jmorl.studio import texts
 from jmorl.studio.between import BlendScore
 from jmorl.studio.dialogue import Dialogue
-from jmorl.studio.selection import wanted
+from jmorl.studio.selection import Selection, last_choice, listed, to_begin_with
 from jmorl.studio.session import Session
 from jmorl.studio.view import View
 
@@ -24,21 +27,50 @@ Tone = Literal["hint", "warning", "failure"]
 Result = TypeVar("Result")
 
 
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """An answer that would end the run, before it is given."""
+
+    question: Question | None  # that it answers; None between two questions
+    policies: tuple[int, ...]  # any of which may become the result
+
+
 class Tab:
     """The session's records that a tab shows, and what somebody who sits at it can do.
 
-    `show` is called when the tab holds something new; `tell` puts a message on the page.
+    `show` is called when the tab holds something new; `tell` puts a message on the page. `kept` outlives a reload of
+    the page: what is laid out is kept there.
     """
 
-    def __init__(self, session: Session, show: Callable[[], None], tell: Callable[[str, Tone], None]):
+    def __init__(
+        self,
+        session: Session,
+        show: Callable[[], None],
+        tell: Callable[[str, Tone], None],
+        kept: MutableMapping[str, Any] | None = None,
+    ):
         self.session = session
-        self.view, self.selection, self.dialogue = session.view, session.selection, session.dialogue
+        self.view, self.dialogue = session.view, session.dialogue
+        self.kept = {} if kept is None else kept
+        self.selection = Selection()
+        self.ending: Ending | None = None  # that somebody is asked to confirm
         self.axes = (0, 1)  # objectives of the chart of points: to the right, and upwards
         self.side = texts.POLICIES  # title of the panel that is open at the side
         self.covered = False  # by a dialog, which takes all keys
         self.generations = 1  # to go on for after the answer, before the next question
         self._settled: Question | None = None  # a question that whoever sits here knows to be answered
         self.show, self.tell = show, tell
+        place, selection = self.kept.get("selection", (None, None))
+        if place == self._place:
+            self._lay_out(selection.known_in(self.view))
+        else:
+            self._begin()
+
+    @property
+    def _place(self) -> tuple[str, str, int]:
+        """Where the run is: what is laid out belongs to a question, and without one to the run."""
+        question = self.view.question
+        return (self.view.run, question.purpose, question.generation) if question else (self.view.run, "", 0)
 
     @property
     def point_question(self) -> PointQuestion | None:
@@ -57,12 +89,23 @@ class Tab:
 
     def follow(self) -> None:
         """Take over what the session has now, and show it."""
-        view, selection, dialogue = self.session.view, self.session.selection, self.session.dialogue
-        if view.path == self.view.path and len(view.choices) > len(self.view.choices):
-            self._tell_of_answer(self.view.question, view)
-        if view.question is not self.view.question:
-            self.generations = 1
-        self.view, self.selection, self.dialogue = view, selection, dialogue
+        before, view, dialogue = self.view, self.session.view, self.session.dialogue
+        if view.path == before.path and len(view.choices) > len(before.choices):
+            self._tell_of_answer(before.question, view)
+        led_to = dialogue.chosen if dialogue and dialogue is not self.dialogue else None
+        self.view, self.dialogue = view, dialogue
+        if view.question is not before.question:
+            self.generations, self.ending = 1, None
+        if view.run != before.run or (view.question and view.question is not before.question):
+            self._begin()
+        elif view is not before:
+            self._lay_out(self.selection.known_in(view))
+        if view.result and (view.run != before.run or not before.result):
+            self._lay_out(self.selection.with_policy(view.result.id))
+        if led_to and view.policy(led_to.id):
+            self._lay_out(self.selection.with_policy(led_to.id))
+        if self.session.prospects is not self.selection.prospects:
+            self.selection = replace(self.selection, prospects=self.session.prospects)
         self.show()
 
     def choose(self, policy: int) -> None:
@@ -72,37 +115,102 @@ class Tab:
             self.tell("No question is open: it is already answered, or still to come.", "warning")
         elif not self.view.choosable(policy):
             self.tell(f"Policy {policy} is not among those you can choose from.", "hint")
+        elif question.purpose == "final":
+            self._ask_to_end(policy)
         else:
             self.answer(question, Answer(policy, generations=self.generations))
 
+    def say_equal(self) -> None:
+        """Answer that there is no difference between the policies of the open question."""
+        question = self.view.question
+        if question:
+            last = last_choice(self.view)
+            kept = last.id if last and self.view.choosable(last.id) else question.front[0].id
+            self.answer(question, Answer(kept, generations=self.generations, equal=True))
+
+    def limit(self, objective: int, least: float | None) -> None:
+        """Set what an objective must reach, from the next answer on for the search, too; None: anything."""
+        limits = list(self.selection.limits or [-math.inf] * len(self.view.objectives))
+        limits[objective] = -math.inf if least is None else least
+        self._lay_out(replace(self.selection, limits=tuple(limits)))
+        self.show()
+
     def keep(self) -> None:
-        """Choose what was chosen last."""
-        if self.view.previous:
-            self.choose(self.view.previous.id)
+        """Choose what was chosen last, or what has replaced it."""
+        kept = last_choice(self.view)
+        if kept:
+            self.choose(kept.id)
+
+    def stop(self) -> None:
+        """Have the end of the run confirmed, with the last choice as its result, or the policy in focus."""
+        last, focus = last_choice(self.view), self.selection.focus
+        policies = [policy for policy in (last.id if last else None, focus) if policy is not None]
+        if self.view.question:
+            policies = [policy for policy in policies if self.view.choosable(policy)]
+        elif last:
+            policies = [last.id]
+        if policies:
+            self._ask_to_end(*dict.fromkeys(policies))
+        else:
+            self.tell("First click a policy that can be chosen: the one that the run shall end with.", "hint")
+
+    def end(self, policy: int) -> None:
+        """End the run with a policy, as somebody has confirmed, wherever the focus is now."""
+        ending, self.ending = self.ending, None
+        if ending is None or policy not in ending.policies:
+            return
+        if ending.question:
+            self.answer(ending.question, Answer(policy, stop=True))
+        else:
+            self.session.end_with(policy)
+        self.show()
+
+    def do_not_end(self) -> None:
+        """Go on: nothing is confirmed."""
+        self.ending = None
+        self.show()
+
+    def ask_now(self) -> None:
+        """Have the next question asked before the next generation."""
+        self.session.ask_now()
+        self.follow()
+
+    async def pause(self) -> None:
+        """Leave the run after the generation that is going on; it can be taken up from there."""
+        self._tell_of_wait("Pausing")
+        await self._in_background(self.session.leave)
+
+    async def train_on(self, rounds: int) -> None:
+        """Go on where the run ended, for some more generations, in a branch."""
+        await self._in_background(self.session.train_on, max(rounds, 1))
 
     def answer(self, question: Question, answer: Answer) -> None:
-        """Answer a question that this tab has shown; a second click does nothing more."""
+        """Answer a question that this tab has shown, with the limits set in it; a second click does nothing more."""
         if question is self._settled:
             return
         self._settled = question
+        if self.selection.limits != question.limits:
+            answer = replace(answer, limits=self.selection.limits)
         if not self.session.answer(question, answer):
             self.tell("This question is already answered, in another tab; nothing has changed.", "warning")
 
     def go_on_for(self, generations: int) -> None:
         """Have the next answer hold for so many generations, at least one."""
-        self.generations = max(generations, 1)
+        left = self.view.timeline.left if self.view.timeline else generations
+        self.generations = min(max(generations, 1), max(left, 1))
 
     def look_at(self, policy: int) -> None:
         """Lay a policy out and put it in focus."""
         if not self.view.policy(policy):
             self.tell(f"Policy {policy} is no longer in the front.", "hint")
-        self.session.look_at(policy)
-        self.follow()
+        if self.view.policy(policy):
+            self._lay_out(self.selection.with_policy(policy))
+        self.show()
 
     def look_along(self, step: int) -> None:
         """Look at the next policy of those shown, in the order of the objective to the right in the chart."""
-        more = wanted(self.view, self.selection)
-        shown = [policy for policy in self.view.front if more is None or policy.id in more]
+        kept = listed(self.view, self.selection)
+        shown = [policy for policy in self.view.front if kept is None or policy.id in kept]
         order = [policy.id for policy in sorted(shown, key=lambda policy: float(policy.values[self.axes[0]]))]
         if order:
             focus = self.selection.focus
@@ -111,13 +219,19 @@ class Tab:
 
     def put_away(self, policy: int) -> None:
         """Lay a policy out no longer."""
-        self.session.put_away(policy)
-        self.follow()
+        self._lay_out(self.selection.without(policy))
+        self.show()
 
     def more_of(self, objective: int) -> None:
-        """Show the policies with more of an objective, or, asked for again, all policies."""
-        self.session.more_of(None if self.selection.more_of == objective else objective)
-        self.follow()
+        """Show the policies with more of an objective than the one in focus, or else the last choice, has.
+
+        Asked for again, show all policies.
+        """
+        previous = self.view.previous.id if self.view.previous else None
+        than = self.selection.focus if self.selection.focus is not None else previous
+        wanted_now = None if self.selection.more_of == objective else objective
+        self._lay_out(replace(self.selection, more_of=wanted_now, than=than))
+        self.show()
 
     def turn_axes(self, axes: tuple[int, int]) -> None:
         """Show other objectives in the chart of points."""
@@ -158,6 +272,26 @@ class Tab:
         """Leave E-NAUTILUS."""
         self.session.close_dialogue()
         self.follow()
+
+    def _begin(self) -> None:
+        """Lay out what the open question is best begun with, or the result."""
+        if self.view.question:
+            self._lay_out(to_begin_with(self.view, self.axes))
+        elif self.view.result:
+            self._lay_out(Selection().with_policy(self.view.result.id))
+        else:
+            self._lay_out(Selection())
+
+    def _lay_out(self, selection: Selection) -> None:
+        """Take a selection over; find out what choosing its policies would mean."""
+        self.selection = replace(selection, prospects=self.session.prospects)
+        self.kept["selection"] = self._place, self.selection
+        for policy in self.selection.letters:
+            self.session.work_out(policy)
+
+    def _ask_to_end(self, *policies: int) -> None:
+        self.ending = Ending(self.view.question, policies)
+        self.show()
 
     async def _in_background(self, command: Callable[..., Result], *arguments: object) -> Result | None:
         """Run a command that takes a while, during which the page goes on. Tell why it failed, if it does."""

@@ -5,15 +5,34 @@ import re
 import numpy as np
 
 from jmorl.display.text import duration, front_question, number_format, plural, short_count, values_in_words
-from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
+from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
 from jmorl.studio.between import EPISODES, BlendScore
-from jmorl.studio.selection import Selection, wanted
+from jmorl.studio.selection import LETTERS, Selection, last_choice, reaching, wanted
 from jmorl.studio.view import PERSON, View
 
 # Titles of panels:
 POLICIES, PROGRESS, HISTORY, NAVIGATION, BETWEEN = "Policies", "Progress", "History", "E-NAUTILUS", "Between"
+LIMITS = "Limits"
+LIMITS_HINT = (
+    "Say what each objective must reach. What does not is left out of the table and grey in the chart; with your next "
+    "answer the search keeps to it, too."
+)
+WARM_UP = "The first policies learn the basics. You see them when the warm-up is over."
+INTRODUCTION = (
+    "Policies are trained that trade {objectives} against each other. After a round of training you say which one you "
+    "like best; the next round searches around it. Nothing is final: you can go back to any earlier question."
+)
+KEEP_HINT = "What you chose last, or what is now better than that in everything."
+ASK_NOW_HINT = "The next question comes when this round is over."
+TAKE_BACK_HINT = "You are asked the question that was answered for you, in a new branch."
+PAUSE_HINT = "The run stops when this round is over, and can go on from there at any time."
+TRAIN_ON_HINT = "A new branch goes on where this run ended. This run and its result stay as they are."
+END_TITLE = "End the run?"
+END_EXPLANATION = "The policy becomes the result. You can step back in the history or train on at any time."
+END_LATER = "The run ends when this round is over."
+LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
 SCORING = "Scoring …"
 MOST_POINTS = 3  # that the prediction model is quoted with
@@ -21,6 +40,7 @@ KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
     ("1 2 …", "what is better in objective 1, 2, …; once more: all policies"),
+    ("=", "of two policies that are asked about, like one as much as the other"),
     ("c", "choose the policy in focus"),
     ("k", "keep the last choice"),
     ("x", "put the policy in focus away"),
@@ -37,20 +57,23 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
     if view.result:
         return f"Finished: {view.reason}"
     if timeline is None:
-        after = f" after generation {view.generations[-1].number}" if view.generations else ""
-        return f"Nothing is running; this run was left{after}"
+        after = f" after round {view.generations[-1].number}" if view.generations else ""
+        return f"Paused{after}"
     if leaving:
-        return "Stopping after this generation"
+        return "Pausing after this round"
     if view.question:
-        return "Waiting for your answer"
+        number = view.questions
+        return "Waiting for your answer" + (f": question {number[0]} of at most {number[1]}" if number else "")
     elapsed = duration(now - timeline.since)
     match timeline.phase:
         case "compiling":
             return f"Compiling the programs, {elapsed}"
         case "warm-up":
-            return f"Warm-up: training {plural(view.config.population.agents, 'new agent')}, {elapsed}"
+            left = timeline.seconds_of_warmup(now)
+            more = "" if left is None else f", about {duration(left)} left"
+            return f"Warm-up: training {plural(view.config.population.agents, 'new agent')}, {elapsed}{more}"
         case "generation":
-            return f"Training generation {timeline.generation}"
+            return f"Training round {timeline.generation}"
         case "blending":
             return f"Blending the front, {elapsed}"
     return "Thinking"
@@ -61,7 +84,7 @@ def facts(view: View, now: float) -> str:
     timeline = view.timeline
     if timeline is None:
         return ""
-    done = [f"generation {_generation(timeline)} of {timeline.generations}"]
+    done = [f"round {_generation(timeline)} of {timeline.generations}"]
     done.append(f"{short_count(timeline.steps(now))} of {short_count(timeline.total_steps)} steps")
     if timeline.finished:
         done.append(f"{short_count(timeline.finished.steps_per_second)} steps/s")
@@ -84,20 +107,86 @@ def heading(view: View, selection: Selection) -> str:
         label = view.objectives[selection.more_of].label
         return f"{plural(len(more), 'policy')} better in {label} than policy {selection.than}"
     if question:
-        return front_question(question.purpose, question.generation, len(question.front), question.form, question.again)
+        purpose, generation, form, again = question.purpose, question.generation, question.form, question.again
+        asked = front_question(purpose, generation, len(question.front), form, again)
+        last = view.timeline is not None and view.timeline.left == 1 and purpose == "steer"
+        return f"{asked} {LAST_ROUND}" if last else asked
     if view.result:
         return f"The result is policy {view.result.id}: {scores(view, view.result)}"
     if view.timeline is None:
         return "Look around, step back in the history, or go on with this run."
     if not view.generations:
-        return "What there is to see comes with the end of the warm-up."
+        return WARM_UP
     if view.config.user != PERSON:
         return f"User {view.config.user} decides; you watch."
-    if view.timeline.silent is None:
+    if view.rounds_to_question is None:
         return "You are asked once, at the end."
-    if view.timeline.silent > 1:
-        return f"You are asked again in {view.timeline.silent} generations."
-    return "You are asked when this generation is over."
+    if view.asking == "end":
+        return END_LATER
+    if view.stand_in and view.previous:
+        return f"Policy {view.previous.id} was chosen for you: {view.stand_in}."
+    if view.rounds_to_question > 1:
+        return f"You are asked again in {view.rounds_to_question} rounds."
+    return "You are asked when this round is over."
+
+
+def introduction(view: View) -> str:
+    """Say to somebody new what happens here."""
+    return INTRODUCTION.format(objectives=" and ".join(objective.label for objective in view.objectives))
+
+
+def ranges(view: View) -> list[str]:
+    """Return the worst and the best value of each objective on the front; nothing without a front."""
+    if not view.front:
+        return [""] * len(view.objectives)
+    each = zip(view.values.min(axis=0), view.values.max(axis=0), formats_of(view), strict=True)
+    return [minus(f"{low:{fmt}} to {high:{fmt}}") for low, high, fmt in each]
+
+
+def limits_reached(view: View, selection: Selection) -> str:
+    """Say how many policies reach the limits."""
+    return f"{int(reaching(view, selection).sum())} of {plural(len(view.front), 'policy')} reach your limits."
+
+
+def keep(view: View) -> str:
+    """Name the way to choose again what was chosen last; nothing where that is not possible."""
+    last = last_choice(view)
+    if last is None or view.previous is None or not view.choosable(last.id):
+        return ""
+    if last.id == view.previous.id:
+        return f"Keep policy {last.id}"
+    return f"Take policy {last.id}, which has replaced {view.previous.id}"
+
+
+def offers_equal(view: View) -> bool:
+    """Return whether the open question is about two policies."""
+    return view.question is not None and (view.question.form == "pair" or view.question.again)
+
+
+def end_with(view: View, selection: Selection, policy: Policy) -> str:
+    """Name a way to end the run: with which policy, by letter, number and scores."""
+    letter = selection.letters.get(policy.id)
+    name = f"{letter}, policy {policy.id}" if letter else f"policy {policy.id}"
+    return f"End with {name}: {minus(values_in_words(policy.values, view.objectives, formats_of(view)))}"
+
+
+def standing(view: View, policy: Policy) -> str:
+    """Say what a policy is to the person: their last choice, what has replaced it, or new; nothing for any other."""
+    last = last_choice(view)
+    if last and policy.id == last.id:
+        return "your last choice" if view.previous and view.previous.id == last.id else "has replaced your last choice"
+    return "new" if view.is_new(policy) else ""
+
+
+def beside(view: View, selection: Selection, policy: Policy) -> str:
+    """Say by how much a policy is better or worse than A, the first that is laid out; nothing of A itself."""
+    first = view.policy(selection.places.get(LETTERS[0], -1))
+    if first is None or first.id == policy.id:
+        return ""
+    each = zip(view.objectives, policy.values - first.values, formats_of(view), strict=True)
+    found = [(f"{abs(change):{fmt}}", change > 0, objective.label) for objective, change, fmt in each]
+    told = [f"{label} {amount} {'better' if better else 'worse'}" for amount, better, label in found if float(amount)]
+    return f"Beside A: {', '.join(told) or 'the same'}"
 
 
 def scores(view: View, policy: Policy) -> str:
@@ -145,27 +234,40 @@ def score_of_each(view: View, policy: Policy) -> list[str]:
     return [minus(f"{value:{fmt}} ±{std:{fmt}}") + f" {o.unit}" for o, value, std, fmt in each]
 
 
-def consequences(view: View, prospect: Prospect | None, policy: Policy) -> str:
-    """Say what choosing a policy would mean: what it rules out, and what the prediction model expects of the rest."""
-    question = view.question
-    if question and not view.choosable(policy.id):
-        if policy.id in {each.id for each in view.front}:
-            return "Outside the bounds, so it cannot be the result"
+def remark(view: View, policy: Policy) -> str:
+    """Say where a policy comes from, that it cannot be chosen, or how far its scores can be trusted as the result's."""
+    if view.question and not view.choosable(policy.id):
         return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
-    if question is None or question.purpose != "steer":
-        return f"born in generation {policy.generation}"
+    if view.question and view.question.purpose == "final":
+        return _certainty(view, policy)
+    return f"trained in round {policy.generation}" if policy.generation else "trained in the warm-up"
+
+
+def outlook(view: View, selection: Selection) -> str:
+    """Say what choosing the policy in focus would mean for the search; nothing where it would mean nothing."""
+    focus, question = selection.focus, view.question
+    if focus is None or question is None or question.purpose != "steer" or not view.choosable(focus):
+        return ""
+    letter = f"If you choose {selection.letters[focus]}:"
+    prospect = selection.prospect
     if prospect is None:
-        return "Working out what choosing it would mean …"
+        return f"{letter} …"
     formats = formats_of(view)
-    count = int((~prospect.kept).sum())
-    bounds = minus(values_in_words(prospect.bounds, view.objectives, formats, "≥ "))
-    ruled_out = f"Rules out {count} of {plural(len(prospect.kept), 'policy')}: {bounds}."
+    kept = int(prospect.kept.sum())
+    narrows = f"{letter} the search narrows to the dashed area, with {kept} of {plural(len(prospect.kept), 'policy')}."
     if not len(prospect.expected):
-        return f"{ruled_out} The model expects nothing new within these bounds."
+        return f"{narrows} Nothing new is expected there."
     best = dict.fromkeys(prospect.expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
     points = [minus(values_in_words(prospect.expected[row], view.objectives, formats)) for row in best]
-    odds = f"Training leads at least as far in {10 * prospect.odds:.0f} of 10 cases."
-    return f"{ruled_out} The model expects {'; or '.join(points[:MOST_POINTS])}. {odds}"
+    odds = f"{10 * prospect.odds:.0f} of 10 such forecasts come true."
+    return f"{narrows} It may find {'; or '.join(points[:MOST_POINTS])}. {odds}"
+
+
+def _certainty(view: View, policy: Policy) -> str:
+    outside = "" if within(policy.values[None], view.bounds)[0] else "Outside the search area. "
+    if policy.confirmation:
+        return f"{outside}Scores from {plural(policy.confirmation.episodes, 'fresh episode')}."
+    return f"{outside}Scores from the search: the best of many, they may be lucky."
 
 
 def minus(text: str) -> str:

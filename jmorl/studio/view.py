@@ -5,6 +5,7 @@ The thread of the run makes it, the page reads it; neither waits for the other.
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from jmorl.storage.stored_run import StoredRun, read_run
 from jmorl.units import measured_in
 
 PERSON = "terminal"  # the config's user whose questions are put on the page
+Asking = Literal["question", "end"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +59,9 @@ class View:
     result: Policy | None = None
     reason: str = ""  # why the run ended, in words
     problem: str = ""  # what broke the run off, a sentence
+    asking: Asking | None = None  # somebody wants the next question before the next generation, or the end
+    stand_in: str = ""  # why the last choice was made by a stand-in; nothing if it was the person's own
+    answered: int | None = None  # generation of the last question that the person answered themselves
     notes: tuple[str, ...] = ()  # what somebody should know about it, sentences
 
     @property
@@ -70,8 +75,29 @@ class View:
         return next((policy for policy in known if policy.id == policy_id), None)
 
     def choosable(self, policy_id: int) -> bool:
-        """Return whether a policy may be the answer to the open question."""
-        return self.question is not None and any(policy.id == policy_id for policy in self.question.front)
+        """Return whether a policy may be the answer to the open question, shown in it or not."""
+        return self.question is not None and any(policy.id == policy_id for policy in self.question.whole.front)
+
+    @property
+    def questions(self) -> tuple[int, int] | None:
+        """The number of the open question among those that the person was asked, and how many there may be at most."""
+        if self.question is None or self.state is None or self.timeline is None or self.config.user != PERSON:
+            return None
+        number = self.state.questions + 1
+        silent = self.timeline.silent is None or self.question.purpose == "final"
+        return number, number + (0 if silent else self.timeline.left)
+
+    @property
+    def rounds_to_question(self) -> int | None:
+        """How many generations end before the person is asked, or a stand-in; None if nobody is before the end."""
+        timeline = self.timeline
+        if timeline is None or timeline.silent is None or self.config.user != PERSON:
+            return None
+        return 1 if self.asking else min(timeline.silent, timeline.left)
+
+    def is_new(self, policy: Policy) -> bool:
+        """Return whether a policy has come since the person was asked last."""
+        return self.answered is not None and policy.generation >= self.answered
 
 
 def stored_view(path: Path) -> View:
@@ -90,6 +116,7 @@ def stored_view(path: Path) -> View:
         bounds=stored.bounds[-1],
         previous=stored.policies[decisions[-1].policy] if decisions else None,
         choices=tuple((record.generation, np.array(record.values)) for record in decisions),
+        answered=max((record.generation for record in decisions if not record.stand_in), default=None),
         result=stored.chosen,
         reason=REASONS[stored.result["reason"]] if stored.result else "",
     )
@@ -102,8 +129,9 @@ def after(view: View, event: Event, now: float) -> View:
     match event:
         case Resumed(state=state):
             past = tuple(choice for choice in view.choices if choice[0] <= state.generation)
+            answered = view.answered if view.answered is None else min(view.answered, state.generation)
             view = replace(view, state=state, front=state.archive.members, bounds=event.bounds)
-            return replace(view, previous=state.choice, choices=past)
+            return replace(view, previous=state.choice, choices=past, answered=answered or None)
         case GenerationFinished(state):
             front = state.archive.members
             values, metrics = values_of(front), event.front
@@ -111,10 +139,17 @@ def after(view: View, event: Event, now: float) -> View:
             return replace(view, state=state, generations=(*view.generations, over), front=front)
         case Decided(chosen=Policy() as chosen):
             choices = (*view.choices, (event.question.generation, chosen.values))
-            return replace(view, question=None, bounds=event.bounds, previous=chosen, choices=choices)
+            asked, generation = event.question.was_asked(event.answer), event.question.generation
+            view = replace(view, question=None, bounds=event.bounds, previous=chosen, choices=choices)
+            return replace(view, answered=generation, stand_in="") if asked else replace(view, stand_in=_reason(event))
         case RunFinished():
             return replace(view, result=event.chosen, reason=REASONS[event.reason], timeline=None)
     return view
+
+
+def _reason(event: Decided) -> str:
+    """Return why a stand-in answered."""
+    return str(getattr(event.answer, "reason", "")) or "your earlier answers speak for it"
 
 
 def _generations(stored: StoredRun) -> tuple[Generation, ...]:

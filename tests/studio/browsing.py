@@ -1,6 +1,7 @@
 """A tab of a real browser, and what a person does in it."""
 
 import os
+import re
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -49,7 +50,7 @@ class Tab:
 
     def asked(self, generation):
         """Wait until the question before this generation is open."""
-        self.page.get_by_text(f"Generation {generation}: which of these").wait_for()
+        self.page.get_by_text(f"Round {generation}: which of these").wait_for()
 
     def final(self):
         self.page.get_by_text("The run is over. Which of these").wait_for()
@@ -64,6 +65,18 @@ class Tab:
     def value(self, row):
         """Return the first objective of a row."""
         return float(self.rows().nth(row).locator("span").nth(2).inner_text().split()[0].replace("−", "-"))
+
+    def put_all_away(self):
+        """Put away what is laid out."""
+        away = self.page.get_by_role("button", name=re.compile("put policy .* away"))
+        while count := away.count():
+            away.first.click()
+            self.page.wait_for_function("(n) => document.querySelectorAll('.choose').length < n", arg=count)
+
+    def to_the_top(self):
+        """Scroll the table to its first row."""
+        self.page.locator(".policies").evaluate("(table) => (table.scrollTop = 0)")
+        self.page.locator('.policies-row[aria-rowindex="2"]').wait_for()
 
     def look_at(self, row):
         """Click a row of the table. Return the number of its policy when its card is there."""
@@ -81,6 +94,17 @@ class Tab:
         policy = self.look_at(row)
         self.card(policy).get_by_role("button", name="Choose").click()
         return policy
+
+    def end(self, policy):
+        """Confirm that the run ends with a policy, which the dialog names."""
+        self.page.get_by_role("button", name=f"policy {policy}:").click()
+
+    def far_out(self):
+        """Return the numbers of the policies at the edge of the chart."""
+        return self.page.evaluate(
+            """() => getElement(document.querySelector(".front .nicegui-echart").id.slice(1)).chart.getOption()
+              .series.find((each) => each.id === "far out").data.map((each) => each.value[0])"""
+        )
 
     def tab(self, name):
         self.page.get_by_role("tab", name=name).click()

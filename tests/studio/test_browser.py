@@ -1,6 +1,7 @@
 """The studio in a real browser: a whole run on MountainCar, and what must not be lost, on a small one."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ pytestmark = pytest.mark.studio
 # E-NAUTILUS shows its question with so many iterations left, or has ended.
 LEFT_OR_ENDED = """(left) => document.querySelector('[aria-label="iterations left"]')?.value === left
   || document.querySelector(".ending")"""
+REPLACED = "has replaced your last choice"
 CHART = """getElement(document.querySelector(".front .nicegui-echart").id.slice(1)).chart"""
 
 
@@ -48,13 +50,18 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         # Two policies beside each other, at work; what choosing the one in focus would mean.
         policies = [tab.look_at(0), tab.look_at(1)]
         assert all(tab.pictures_differ(policy) for policy in policies)
-        tab.card(policies[1]).get_by_text("Rules out").wait_for()
+        tab.page.get_by_text(re.compile("If you choose .: the search narrows")).wait_for()
         tab.card(policies[1]).locator(".totals dd").first.wait_for()
         tab.screenshot("2-question")
         tab.card(policies[1]).get_by_role("button", name="Choose").click()
-        tab.page.get_by_text("Training generation 1").wait_for()
+        tab.page.get_by_text(re.compile("Training round 1|Round 2: which")).first.wait_for()
         tab.screenshot("3-training")
         tab.asked(2)
+        # The last choice, or what replaced it, is in focus; what is far out is at the edge.
+        assert tab.page.locator(".place.focus .standing").inner_text() in ("your last choice", REPLACED)
+        assert tab.page.locator(".place.focus .mark-A").is_visible() and tab.page.get_by_text("new", exact=True).count()
+        assert tab.far_out() and set(map(str, tab.far_out())) < set(tab.policies())
+        assert tab.page.locator(".front .nicegui-echart").count() == 1  # marks cannot lie beside their points
         before = tab.bounds()
         tab.page.get_by_role("button", name="fuel", exact=True).click()
         tab.screenshot("4-more-of-fuel")
@@ -75,7 +82,7 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         tab.tab("Policies")
         last = tab.rows().count() - 1
         otherwise = tab.look_at(last)
-        tab.page.get_by_role("spinbutton", name="generations before the next question").fill("2")
+        tab.page.get_by_role("spinbutton", name="rounds before the next question").fill("2")
         tab.page.keyboard.press("Tab")
         tab.card(otherwise).get_by_role("button", name="Choose").click()
         tab.asked(3)
@@ -110,6 +117,7 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         tab.screenshot("8-final-question")
         result = tab.look_at(0)
         tab.card(result).get_by_role("button", name="is the result").click()
+        tab.end(result)
         tab.page.get_by_text(f"The result is policy {result}").wait_for()
         tab.screenshot("9-end")
         with tab.page.expect_download() as download:
@@ -160,14 +168,85 @@ def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, 
         assert len(decisions(path)) == 2
 
 
+def test_silence_is_broken_a_run_paused_ended_and_trained_on(browser, tmp_path):
+    path = tmp_path / "run"
+    with Served("--out", path, "--steps", 624_000, "--population.iterations", 4, "--ask", "always") as studio:
+        tab = Tab(browser, studio.address)
+        tab.asked(1)
+        rounds = tab.page.get_by_role("spinbutton", name="rounds before the next question")
+        rounds.fill("99")
+        tab.page.keyboard.press("Tab")
+        tab.choose(0)
+        tab.page.get_by_text("You are asked again in 4 rounds.").wait_for()  # as many as there are
+        tab.page.get_by_role("button", name="Ask me after this round").click()
+        tab.page.get_by_text(re.compile("Round [234]: which of these")).wait_for()
+        tab.choose(0)
+        tab.page.get_by_role("button", name="Pause training").click()
+        tab.page.get_by_text("Paused after round").wait_for()
+        tab.screenshot("11-paused")
+        tab.page.get_by_role("button", name="Go on with this run").click()
+        tab.page.get_by_text(re.compile("Round [34]: which of these")).wait_for()
+        # Another policy is looked at, and the run still ends with the one that was chosen.
+        tab.look_at(tab.rows().count() - 1)
+        tab.page.get_by_role("button", name="Stop here").click()
+        tab.page.get_by_text("End the run?").wait_for()
+        tab.screenshot("12-the-end")
+        tab.page.get_by_role("button", name="End with").first.click()
+        tab.page.get_by_text("The result is policy").wait_for()
+        ended = decisions(path)[-1]
+        last = decisions(path)[-2]
+        better = np.array(ended["values"]) >= np.array(last["values"])
+        assert ended["stop"] and (ended["policy"] == last["policy"] or better.all())
+        tab.page.get_by_role("spinbutton", name="rounds to train on for").fill("2")
+        tab.page.keyboard.press("Tab")
+        tab.page.get_by_role("button", name="Train on for").click()
+        tab.page.get_by_text("which of these").wait_for()
+        tab.page.get_by_text("of 2 rounds").wait_for()
+        assert not tab.problems
+    assert read_run(path).chosen.id == ended["policy"]
+
+
+def test_the_last_question_allows_every_policy_and_is_confirmed(browser, small, tmp_path):
+    """With the paper's rule, which asks about those within the bounds only."""
+    path = tmp_path / "run"
+    with Served("--out", path, *small) as studio:
+        tab = Tab(browser, studio.address)
+        for generation in (1, 2, 3):
+            tab.asked(generation)
+            if generation == 3:
+                tab.page.get_by_text("This is the last round").wait_for()
+            tab.choose(0)
+        tab.final()
+        keep = tab.page.get_by_role("button", name=re.compile("Keep|Take"))
+        if keep.count():
+            keep.click()
+            tab.page.get_by_text("End the run?").wait_for()
+            tab.page.get_by_role("button", name="Go on", exact=True).click()
+            tab.page.get_by_text("End the run?").wait_for(state="hidden")
+        outside = tab.page.locator(".policies-row.outside")
+        assert outside.count()
+        policy = int(outside.last.locator("span").nth(1).inner_text())
+        outside.last.click()
+        tab.card(policy).get_by_text("Outside the search area.").wait_for()
+        tab.card(policy).get_by_role("button", name="is the result").click()
+        assert len(decisions(path)) == 3
+        tab.end(policy)
+        tab.page.get_by_text(f"The result is policy {policy}").wait_for()
+        assert decisions(path)[-1]["policy"] == policy and not tab.problems
+
+
 def test_of_two_tabs_the_first_answers_and_the_second_is_told(browser, small, tmp_path):
     path = tmp_path / "run"
     with Served("--out", path, *small) as studio:
         tabs = [Tab(browser, studio.address) for _ in range(2)]
         for tab in tabs:
             tab.asked(1)
-        policy = tabs[0].look_at(0)
-        tabs[1].card(policy).wait_for()  # both see the same
+        # Each looks at what it likes.
+        policy, other = tabs[0].look_at(0), tabs[1].look_at(1)
+        tabs[0].page.wait_for_timeout(500)
+        focused = [tab.page.locator(".place.focus .card-title").inner_text() for tab in tabs]
+        assert focused == [f"policy {policy}", f"policy {other}"]
+        tabs[1].look_at(0)
         buttons = [tab.card(policy).get_by_role("button", name="Choose").element_handle() for tab in tabs]
         for button in buttons:
             button.evaluate("(button) => button.click()")
@@ -186,10 +265,12 @@ def test_a_front_of_thousands_with_three_objectives_can_be_searched(browser):
     with Served(command=("benchmarks.studio", "still")) as studio:
         tab = Tab(browser, studio.address)
         tab.asked(4)
+        tab.to_the_top()
         first = tab.look_at(0)
         best = tab.value(0)
         tab.page.get_by_role("columnheader", name="objective 1").click()  # the other way round
         tab.page.wait_for_function("(n) => !document.querySelector('.policies-row').textContent.includes(n)", arg=first)
+        tab.to_the_top()
         assert tab.value(0) < tab.value(1) < best
         tab.page.get_by_role("button", name="objective 3", exact=True).click()
         tab.page.get_by_text(f"better in objective 3 than policy {first}").wait_for()
@@ -229,6 +310,7 @@ def test_the_keyboard_is_enough(browser, small, tmp_path):
         tab.page.locator(".place.focus").wait_for()
         keys.press("c")
         tab.asked(2)
+        tab.page.locator(".place.focus").wait_for()
         first = decisions(path)[0]["policy"]
         keys.press("?")
         tab.page.get_by_text("keep the last choice").wait_for()
@@ -236,14 +318,15 @@ def test_the_keyboard_is_enough(browser, small, tmp_path):
         tab.page.get_by_text("keep the last choice").wait_for(state="hidden")
         keys.press("k")
         tab.asked(3)
-        assert [each["policy"] for each in decisions(path)] == [first, first]
+        assert [each["generation"] for each in decisions(path)] == [1, 2]
+        assert first in [each["policy"] for each in decisions(path)[1]["shown"]]
         # To the button that stops the run, by the tabulator alone.
         for _ in range(60):
             keys.press("Tab")
             if tab.page.evaluate("document.activeElement.textContent.trim()") == "Stop here":
                 break
         keys.press("Enter")
-        end = tab.page.get_by_role("button", name="End the run")
+        end = tab.page.get_by_role("button", name="End with").first
         end.wait_for()
         keys.press("k")  # goes to the dialog, for which it means nothing
         end.press("Enter")
@@ -258,6 +341,7 @@ def test_a_dial_leads_from_one_policy_to_another(browser, tmp_path):
         tab = Tab(browser, studio.address)
         tab.asked(1)
         tab.tab("Between")
+        tab.put_all_away()
         tab.page.get_by_text("Lay out two policies").wait_for()
         tab.tab("Policies")
         first, second = tab.look_at(0), tab.look_at(tab.rows().count() - 1)

@@ -12,7 +12,7 @@ from jmorl.config import resolve
 from jmorl.decision.protocol import Question
 from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Confirmation, Policy
 from jmorl.studio import dialogue, texts
 from jmorl.studio.charts.curves import curve_options
 from jmorl.studio.charts.front_chart import front_marks, front_options
@@ -46,8 +46,9 @@ def view():
     )
 
 
-def series(options):
-    return {each["name"]: each for each in options["series"]}
+def series(drawn):
+    """Return the series of options, or of marks, by their names."""
+    return {each["name"]: each for each in (drawn["series"] if isinstance(drawn, dict) else drawn)}
 
 
 def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(view):
@@ -71,11 +72,24 @@ def test_axes_hold_the_front_the_bounds_and_the_choice(view):
     assert "time (-steps)" in options["xAxis"]["name"] and "better" in options["xAxis"]["name"]
 
 
-def test_what_is_too_far_out_to_be_shown_is_counted(view):
-    assert front_options(view, (0, 1), None)["title"]["text"] == ""
-    with_stray = replace(view, front=(*view.front, policy(6, (-75.0, -30.0)), policy(7, (-900.0, -5.0))))
-    options = front_options(with_stray, (0, 1), None)
-    assert options["title"]["text"] == "1 policy far out, in the table only" and options["xAxis"]["min"] > -200
+def test_what_is_far_out_is_at_the_edge_with_an_arrow_and_its_value(view):
+    assert series(front_options(view, (0, 1), None))["far out"]["data"] == []
+    with_stray = replace(view, front=(*view.front, policy(6, (-75.0, -30.0)), policy(7, (-900.0, -25.0))))
+    for axes, edge, turned in (((0, 1), "x", 90), ((1, 0), "y", 180)):
+        options = front_options(with_stray, axes, None)
+        low = options["xAxis" if edge == "x" else "yAxis"]["min"]
+        assert low > -200
+        drawn = series(options)["far out"]
+        (arrow,) = drawn["data"]
+        number, *values, note = arrow["value"][:4]
+        assert (number, values, note) == (7, [-900.0, -25.0], "far out")
+        assert arrow["value"][drawn["encode"][edge]] == low and arrow["symbolRotate"] == turned
+        assert arrow["label"]["formatter"] == "time −900.0" and not drawn["clip"]
+        assert 7 not in [
+            point[0] for name in ("within", "outside") for point in series(options)[f"{name} the bounds"]["data"]
+        ]
+        laid_out = series(front_marks(with_stray, Selection().with_policy(7), axes, None))["laid out"]
+        assert laid_out["data"][0]["value"][laid_out["encode"][edge]] == low
 
 
 def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
@@ -84,26 +98,27 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
     for shown in (view, empty):
         for options in (
             front_options(shown, (0, 1), asked),
-            front_marks(shown, Selection().with_policy(9), (0, 1), asked),
             parallel_options(shown),
-            parallel_marks(shown, Selection().with_policy(9)),
             curve_options(shown),
         ):
             assert options["tooltip"]["renderMode"] == "richText"
             assert all("renderMode" not in each.get("tooltip", {}) for each in options["series"])
             json.dumps(options, allow_nan=False)
+        selection = Selection().with_policy(9)
+        for marks in (front_marks(shown, selection, (0, 1), asked), parallel_marks(shown, selection)):
+            assert all(each["silent"] and "tooltip" not in each for each in marks)
+            json.dumps(marks, allow_nan=False)
 
 
-def test_marks_lie_exactly_over_the_chart(view):
-    chart, marks = front_options(view, (1, 0), None), front_marks(view, Selection().with_policy(9), (1, 0), None)
-    for axis in ("xAxis", "yAxis"):
-        assert [chart[axis][end] for end in ("min", "max")] == [marks[axis][end] for end in ("min", "max")]
-        assert chart[axis]["show"] and not marks[axis]["show"]
-    assert chart["grid"] == marks["grid"]
-    lines, marked = parallel_options(view), parallel_marks(view, Selection().with_policy(9))
-    for shown, hidden in zip(lines["parallelAxis"], marked["parallelAxis"], strict=True):
-        assert (shown["min"], shown["max"]) == (hidden["min"], hidden["max"]) and not hidden["name"]
-    assert all(lines["parallel"][side] == marked["parallel"][side] for side in ("left", "right", "top", "bottom"))
+def test_marks_have_ids_of_their_own(view):
+    """They are sent without the rest of the chart, which they must not replace."""
+    selection = Selection().with_policy(9)
+    for options, marks in (
+        (front_options(view, (1, 0), None), front_marks(view, selection, (1, 0), None)),
+        (parallel_options(view), parallel_marks(view, selection)),
+    ):
+        ids = [each["id"] for each in (*options["series"], *marks)]
+        assert len(set(ids)) == len(ids)
 
 
 def test_charts_have_the_same_series_whatever_there_is_to_see(view):
@@ -114,18 +129,29 @@ def test_charts_have_the_same_series_whatever_there_is_to_see(view):
         (front_options(view, (0, 1), asked), front_options(empty, (0, 1), None)),
         (front_marks(view, Selection().with_policy(9), (0, 1), asked), front_marks(empty, Selection(), (0, 1), None)),
         (parallel_options(view), parallel_options(empty)),
+        (parallel_marks(view, Selection().with_policy(9)), parallel_marks(empty, Selection())),
         (curve_options(view), curve_options(empty)),
     ):
-        assert [each["id"] for each in much["series"]] == [each["id"] for each in little["series"]]
+        assert list(series(much)) == list(series(little))
 
 
 def test_what_cannot_be_chosen_says_why(view):
     gone = policy(77, (-99.0, -99.0))
     final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
     for each in (view, final):
-        assert "cannot be chosen" in texts.consequences(replace(each, previous=gone), None, gone)
-    assert texts.consequences(final, None, view.front[2]) == "Outside the bounds, so it cannot be the result"
-    assert texts.consequences(final, None, view.front[0]) == "born in generation 1"
+        assert "cannot be chosen" in texts.remark(replace(each, previous=gone), gone)
+
+
+def test_the_last_question_says_how_far_scores_can_be_trusted(view):
+    """Every policy of the front can be the result, with a word where it lies outside, or may be lucky."""
+    sure = replace(view.front[0], confirmation=Confirmation(view.front[0].values, view.front[0].std, 128, np.ones(2)))
+    front = sure, *view.front[1:]
+    question = replace(view.question, purpose="final", front=front[:2], others=front[2:])
+    final = replace(view, question=question, front=front)
+    assert texts.remark(final, sure) == "Scores from 128 fresh episodes."
+    assert texts.remark(final, front[1]).startswith("Scores from the search")
+    assert texts.remark(final, front[2]).startswith("Outside the search area. Scores from the search")
+    assert all(final.choosable(policy.id) for policy in front)
 
 
 def test_the_axes_hold_the_choices_and_what_enautilus_shows(view):
@@ -174,11 +200,17 @@ def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
     assert (
         not unfocused["bounds that would follow"]["markArea"]["data"] and not unfocused["expected by the model"]["data"]
     )
-    text = texts.consequences(view, prospect, view.front[1])
-    assert "Rules out 3 of 4 policies: time ≥ −75.0, <b>fuel</b> ≥ −42.0." in text
+    text = texts.outlook(view, selection)
     # Whole points, and never the best of each joined.
-    expects = "expects time −65.0, <b>fuel</b> −30.0; or time −75.0, <b>fuel</b> −15.0."
-    assert f"{expects} Training leads at least as far in 3 of 10 cases." in text
+    assert text == (
+        "If you choose B: the search narrows to the dashed area, with 1 of 4 policies. It may find time −65.0, "
+        "<b>fuel</b> −30.0; or time −75.0, <b>fuel</b> −15.0. 3 of 10 such forecasts come true."
+    )
+    assert texts.outlook(view, replace(selection, focus=4)) == "If you choose A: …"  # is being worked out
+    assert texts.outlook(replace(view, question=None), selection) == ""
+    lines = series(parallel_marks(view, selection))
+    assert lines["bounds that would follow"]["data"] == [[-75.0, -42.0]]
+    assert series(parallel_marks(replace(view, question=None), selection))["bounds that would follow"]["data"] == []
 
 
 def test_lines_across_the_axes_have_the_values_of_the_policies(view):
@@ -190,16 +222,6 @@ def test_lines_across_the_axes_have_the_values_of_the_policies(view):
     assert shown["laid out"]["data"][0]["value"] == [*VALUES[2], 2]
 
 
-def test_outside_the_bounds_nothing_looks_choosable_at_the_end(view):
-    final = replace(view, question=replace(view.question, purpose="final", front=view.front[:2]))
-    borders = [
-        series(front_options(each, (0, 1), None))["outside the bounds"]["itemStyle"]["borderColor"]
-        for each in (view, final)
-    ]
-    assert borders == ["#0072B2", "#b8b8b8"]
-    assert final.choosable(4) and not final.choosable(2) and view.choosable(2)
-
-
 @pytest.mark.parametrize(("objective", "than", "expected"), [(0, 4, [9, 2]), (1, 4, [5]), (0, None, [5, 4, 9, 2])])
 def test_more_of_an_objective_lists_the_least_change_first(view, objective, than, expected):
     selection = Selection(more_of=objective, than=than)
@@ -208,13 +230,28 @@ def test_more_of_an_objective_lists_the_least_change_first(view, objective, than
     assert {ring[0] for ring in rings} == set(expected)
 
 
+def test_what_does_not_reach_the_limits_is_grey(view):
+    def areas(axes, *limits):
+        return series(front_marks(view, Selection(limits=limits or None), axes, None))["limits"]["markArea"]["data"]
+
+    assert areas((0, 1)) == [] == areas((0, 1), -np.inf, -np.inf)
+    options = front_options(view, (0, 1), None)
+    (left, right), (low, high) = ([options[axis][end] for end in ("min", "max")] for axis in ("xAxis", "yAxis"))
+    assert areas((0, 1), -75.0, -np.inf) == [[{"coord": [left, low]}, {"coord": [-75.0, high]}]]
+    assert areas((0, 1), -np.inf, -30.0) == [[{"coord": [left, low]}, {"coord": [right, -30.0]}]]
+    assert len(areas((1, 0), -75.0, -30.0)) == 2
+    assert areas((0, 1), 50.0, -np.inf) == [[{"coord": [left, low]}, {"coord": [right, high]}]]
+
+
 def test_with_nothing_wanted_there_is_no_ring(view):
     assert wanted(view, Selection()) is None
     assert not series(front_marks(view, Selection(), (0, 1), None))["more of an objective"]["data"]
 
 
 def test_the_heading_says_what_is_asked(view):
-    assert texts.heading(view, Selection()) == "Generation 2: which of these 4 policies do you prefer?"
+    assert texts.heading(view, Selection()) == "Round 2: which of these 4 policies do you prefer?"
+    last = replace(view, timeline=replace(view.timeline, generation=view.timeline.generations))
+    assert texts.heading(last, Selection()).endswith("This is the last round: after it you choose the result.")
     assert texts.heading(view, Selection(more_of=0, than=4)) == "2 policies better in time than policy 4"
     final = replace(view, question=replace(view.question, purpose="final"))
     assert texts.heading(final, Selection()) == "The run is over. Which of these 4 policies is its result?"
@@ -227,8 +264,9 @@ def test_the_heading_says_what_is_asked(view):
 @pytest.mark.parametrize(
     ("silent", "user", "text"),
     [
-        (1, "terminal", "You are asked when this generation is over."),
-        (3, "terminal", "You are asked again in 3 generations."),
+        (1, "terminal", "You are asked when this round is over."),
+        (3, "terminal", "You are asked again in 3 rounds."),
+        (99, "terminal", "You are asked again in 9 rounds."),  # as many as are left
         (None, "terminal", "You are asked once, at the end."),
         (1, "A", "User A decides; you watch."),
     ],
@@ -242,7 +280,7 @@ def test_between_questions_the_heading_says_who_is_asked_and_when(view, silent, 
     ("changes", "text"),
     [
         ({}, "Waiting for your answer"),
-        ({"question": None, "timeline": None}, "Nothing is running; this run was left after generation 1"),
+        ({"question": None, "timeline": None}, "Paused after round 1"),
         ({"problem": "OSError: full"}, "Stopped: OSError: full"),
     ],
 )

@@ -23,14 +23,19 @@ def best(question, objective):
 
 def answer_all(session, objective=0):
     """Answer every question until the run ends. Return the answers."""
+    return answer_all_from(session, session.question(), objective)
+
+
+def answer_all_from(session, question, objective=0):
+    """Answer a question, and every later one."""
     answers = []
     while True:
-        question = session.question()
         answers.append(best(question, objective))
         assert session.answer(question, Answer(answers[-1]))
         if question.purpose == "final":
             session.ended()
             return answers
+        question = session.question()
 
 
 def test_a_run_steered_on_the_page_replays_from_its_log_to_the_same_result(session, person_config, tmp_path):
@@ -204,37 +209,78 @@ def test_a_run_with_an_artificial_user_is_watched(small_config, make_session, tm
     assert all(generation.utility is not None for generation in session.view.generations)
 
 
-def test_what_is_laid_out_is_seen_in_the_light_of_the_question(session):
+def test_what_a_choice_would_mean_is_worked_out_once_for_each_question(session):
     question = session.question()
-    first, second = question.front[0], question.front[-1]
-    for policy in (first, second):
-        session.look_at(policy.id)
-    session.look_at(12345)  # there is none
+    chosen = question.front[-1]
+    for policy in (chosen.id, chosen.id, 12345):  # there is no such policy
+        session.work_out(policy)
     session.thought()
-    selection = session.selection
-    assert selection.letters == {first.id: "A", second.id: "B"} and selection.focus == second.id
-    assert set(selection.prospects) == {first.id, second.id}
-    session.answer(question, Answer(second.id))
+    prospects = session.prospects
+    assert set(prospects) == {chosen.id}
+    session.work_out(chosen.id)
+    session.thought()
+    assert session.prospects is prospects
+    session.answer(question, Answer(chosen.id))
     session.question()
-    session.thought()
-    np.testing.assert_array_equal(session.view.bounds, selection.prospects[second.id].bounds)
-    assert set(session.selection.prospects) <= set(session.selection.letters)
-    for policy in tuple(session.selection.letters):
-        session.put_away(policy)
-    assert session.selection.focus is None
+    assert not session.prospects
+    np.testing.assert_array_equal(session.view.bounds, prospects[chosen.id].bounds)
 
 
-def test_more_is_more_than_the_policy_that_was_in_focus_when_it_was_asked_for(session):
+def test_who_wants_to_be_asked_is_asked_before_the_next_generation_and_it_replays(session, person_config, tmp_path):
     question = session.question()
-    first, second = question.front[0].id, question.front[-1].id
-    session.more_of(1)
-    assert (session.selection.more_of, session.selection.than) == (1, None)  # nothing to compare with
-    session.look_at(first)
-    session.more_of(1)
-    session.look_at(second)
-    assert session.selection.than == first
-    session.more_of(None)
-    assert session.selection.more_of is None
+    session.ask_now()
+    assert session.view.asking == "question" and session.view.rounds_to_question == 1
+    session.answer(question, Answer(best(question, 0), generations=3))
+    question = session.question()
+    assert (question.generation, question.purpose, session.view.asking) == (2, "steer", None)
+    answers = [best(question, 2)]
+    session.answer(question, Answer(answers[0]))
+    answers += answer_all(session, objective=2)
+    config = person_config.replace(user=f"script={session.view.path / 'decisions.jsonl'}")
+    folder = RunFolder.create(tmp_path / "replayed", config, envs.make(config.env))
+    replayed = outcome(follow(Continued(folder, None)))
+    assert replayed[4] == outcome(session.view.path)[4]
+
+
+def test_a_run_is_ended_between_two_questions(session):
+    question = session.question()
+    policy = best(question, 0)
+    session.end_with(policy)
+    assert session.view.asking == "end"
+    session.answer(question, Answer(policy, generations=3))
+    session.ended()
+    assert session.view.result.id == policy and session.view.reason == "the user ended it"
+    assert session.view.generations[-1].number == 1
+
+
+def test_a_paused_run_goes_on(session):
+    question = session.question()
+    session.answer(question, Answer(best(question, 0), generations=3))
+    session.leave()
+    assert session.view.timeline is None and session.view.result is None and not session.leaving
+    session.switch(session.view.run)
+    question = session.question()
+    assert question.generation in (2, 3, 4)
+
+
+def test_a_run_that_has_ended_is_trained_on_in_a_branch(session):
+    answer_all(session)
+    path, last = session.view.path, session.view.generations[-1]
+    session.train_on(2)
+    question = session.question()
+    assert session.view.path == path.with_name("run-2")
+    assert (question.purpose, question.generation) == ("steer", last.number + 1)
+    assert session.view.timeline.left == 2
+    answer_all_from(session, question)
+    assert session.view.generations[-1].number == last.number + 2
+    assert read_run(path).result is not None  # it stays as it was
+
+
+def test_a_run_that_goes_on_is_not_trained_on(session):
+    question = session.question()
+    with pytest.raises(ValueError, match="has not ended"):
+        session.train_on(1)
+    assert session.view.question is question
 
 
 def test_enautilus_in_a_finished_run_is_what_the_command_would_have_been_led_to(session):
@@ -246,7 +292,6 @@ def test_enautilus_in_a_finished_run_is_what_the_command_would_have_been_led_to(
         assert not session.reply(at, Choose(0))  # another tab was first
     chosen, path = session.dialogue.chosen, session.view.path
     assert json.loads((path / "enautilus.json").read_text())["policy"] == chosen.id
-    assert session.selection.focus == chosen.id
     stored = read_run(path)
     assert choose_afterwards(stored, ScriptedUser(path / "enautilus.jsonl"), 3, 2).id == chosen.id
 

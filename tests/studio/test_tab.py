@@ -2,21 +2,26 @@
 
 import asyncio
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import envs
 from jmorl.decision.answers import Answer, Choose
+from jmorl.storage.resume import Continued
+from jmorl.storage.run_folder import RunFolder
 from jmorl.studio import texts
+from jmorl.studio.selection import last_choice, listed
 from jmorl.studio.tab import Tab
 
 
 class Watching:
     """A tab, with what it has said and how often it was shown."""
 
-    def __init__(self, session):
+    def __init__(self, session, kept=None):
         self.said, self.shown = [], 0
-        self.tab = Tab(session, self._show, lambda text, tone: self.said.append((tone, text)))
+        self.tab = Tab(session, self._show, lambda text, tone: self.said.append((tone, text)), kept)
 
     def _show(self):
         self.shown += 1
@@ -40,6 +45,18 @@ def tab(watching):
 
 def order(front, objective):
     return [policy.id for policy in sorted(front, key=lambda policy: policy.values[objective])]
+
+
+def chosen_so_far(session):
+    return chosen(session) if (session.view.path / "decisions.jsonl").exists() else []
+
+
+def lay_out(tab, *policies):
+    """Lay out these policies, and no others."""
+    for policy in tuple(tab.selection.letters):
+        tab.put_away(policy)
+    for policy in policies:
+        tab.look_at(policy)
 
 
 def chosen(session):
@@ -89,6 +106,162 @@ def test_what_cannot_be_chosen_is_no_answer(session, question, watching):
     assert watching.said == [("warning", "No question is open: it is already answered, or still to come.")]
 
 
+def test_a_question_begins_with_a_compromise_and_the_ends_of_the_front(question, tab):
+    letters = {letter: policy for policy, letter in tab.selection.letters.items()}
+    assert letters["B"] == order(question.front, 0)[-1] and letters["C"] == order(question.front, 1)[-1]
+    assert tab.selection.focus == letters["A"] and not any(tab.view.is_new(policy) for policy in question.front)
+
+
+def test_after_an_answer_the_last_choice_is_in_focus_with_new_policies_beside_it(session, question, tab):
+    """Whatever was looked at before: the filled button must not lead to a policy that somebody decided against."""
+    policy, other = question.front[0].id, question.front[-1].id
+    tab.look_at(policy)
+    tab.choose(policy)
+    tab.look_at(other)
+    session.question()
+    tab.follow()
+    last = last_choice(tab.view)
+    assert tab.selection.places["A"] == tab.selection.focus == last.id
+    assert last.id == policy or (last.values >= tab.view.previous.values).all()
+    beside = [tab.view.policy(tab.selection.places[letter]) for letter in "BC"]
+    newcomers = [each for each in tab.view.front if tab.view.is_new(each) and each is not last]
+    assert newcomers
+    for each, axis in zip(beside, tab.axes, strict=True):
+        better = [newcomer for newcomer in newcomers if newcomer.values[axis] > last.values[axis]]
+        assert each in better or not set(better) - set(beside)
+
+
+def test_what_is_looked_at_belongs_to_a_tab_and_outlives_a_reload(session, question):
+    kept = {}
+    tabs = [Watching(session, kept).tab, Watching(session).tab]
+    lay_out(tabs[0], question.front[1].id)
+    tabs[1].follow()
+    assert tabs[0].selection.letters != tabs[1].selection.letters
+    again = Watching(session, kept).tab
+    assert again.selection.letters == tabs[0].selection.letters == {question.front[1].id: "A"}
+    session.answer(question, Answer(question.front[0].id))
+    session.question()
+    again = Watching(session, kept).tab  # another question has opened since
+    assert again.selection.focus == last_choice(again.view).id
+
+
+def test_an_end_is_confirmed_once_and_named(session, question, watching):
+    tab = watching.tab
+    lay_out(tab)
+    tab.stop()
+    assert watching.tab.ending is None and watching.said[0][0] == "hint"
+    tab.choose(question.front[0].id)
+    session.question()
+    tab.follow()
+    last = last_choice(tab.view)
+    others = [policy.id for policy in tab.view.front if policy.id != last.id]
+    tab.look_at(others[0])
+    tab.stop()
+    assert tab.ending.policies == (last.id, others[0])
+    assert texts.end_with(tab.view, tab.selection, last).startswith(f"End with A, policy {last.id}: north ")
+    tab.end(others[1])  # none of those that were asked about
+    assert watching.tab.ending is None and session.view.question
+    tab.stop()
+    tab.do_not_end()
+    tab.end(last.id)
+    assert session.view.question
+    tab.stop()
+    tab.end(last.id)
+    session.ended()
+    assert session.view.result.id == last.id and session.view.reason == "the user ended it"
+    tab.follow()
+    assert tab.selection.focus == last.id
+
+
+def test_the_last_answer_is_confirmed_whatever_gives_it(session, question, tab):
+    tab.go_on_for(99)
+    assert tab.generations == 3  # no more are left
+    tab.choose(question.front[0].id)
+    final = session.question()
+    assert final.purpose == "final"
+    tab.follow()
+    for give in (tab.keep, lambda: tab.choose(tab.selection.focus)):
+        give()
+        assert tab.ending.policies == (tab.selection.focus,) and session.view.question is final
+        tab.do_not_end()
+    tab.keep()
+    tab.end(tab.ending.policies[0])
+    session.ended()
+    assert session.view.result.id == tab.selection.focus
+
+
+def test_limits_leave_out_what_does_not_reach_them_and_go_with_the_answer(session, question, tab):
+    east = order(question.front, 0)
+    least = question.policy(east[-2]).values[0]
+    tab.limit(0, float(least))
+    assert listed(tab.view, tab.selection) == [p.id for p in question.front if p.values[0] >= least]
+    assert texts.limits_reached(tab.view, tab.selection) == f"2 of {len(question.front)} policies reach your limits."
+    tab.look_along(-1)
+    assert tab.selection.focus in east[-2:]
+    tab.choose(east[0])  # which they may all the same
+    assert session.question().limits == (least, -np.inf, -np.inf)
+    tab.follow()
+    assert tab.selection.limits == (least, -np.inf, -np.inf)
+    tab.limit(0, None)
+    assert listed(tab.view, tab.selection) is None
+    tab.choose(tab.selection.focus)
+    assert session.question().limits == (-np.inf,) * 3
+    lines = [json.loads(line) for line in (session.view.path / "decisions.jsonl").read_text().splitlines()]
+    assert [line["limits"] for line in lines] == [[least, None, None], [None, None, None]]
+
+
+def test_two_policies_may_be_equal(person_config, make_session, tmp_path):
+    session = make_session()
+    config = person_config.replace(question="pair")
+    session.drive(Continued(RunFolder.create(tmp_path / "run", config, envs.make(config.env)), None))
+    question, tab = session.question(), Watching(session).tab
+    assert question.form == "pair" and texts.offers_equal(tab.view)
+    assert list(tab.selection.letters) == [policy.id for policy in question.front]
+    tab.say_equal()
+    session.question()
+    tab.follow()
+    line = json.loads((session.view.path / "decisions.jsonl").read_text())
+    assert line["equal"] and {each["policy"] for each in line["shown"]} == {policy.id for policy in question.front}
+
+
+def test_one_is_told_what_a_stand_in_has_chosen_and_how_many_questions_there_may_be(
+    person_config, make_session, tmp_path
+):
+    session = make_session()
+    config = person_config.replace(ask="unsure")
+    session.drive(Continued(RunFolder.create(tmp_path / "run", config, envs.make(config.env)), None))
+    question, tab = session.question(), Watching(session).tab
+    assert texts.phase(tab.view, 0.0) == "Waiting for your answer: question 1 of at most 4"
+    chosen_for = None
+    while question.purpose != "final":
+        tab.choose(order(question.front, 0)[-1])
+        question = session.question()
+        tab.follow()
+        chosen_for = chosen_for or tab.view.stand_in
+    lines = (session.view.path / "decisions.jsonl").read_text().splitlines()
+    stand_in = [json.loads(line).get("stand_in", False) for line in lines]
+    assert any(stand_in) == bool(chosen_for)
+    if chosen_for:
+        between = replace(tab.view, question=None, stand_in=chosen_for)
+        told = texts.heading(between, tab.selection)
+        assert told == f"Policy {tab.view.previous.id} was chosen for you: {chosen_for}."
+    own = 1 + sum(not each for each in stand_in)
+    assert texts.phase(tab.view, 0.0) == f"Waiting for your answer: question {own} of at most {own}"
+
+
+def test_between_questions_one_stops_with_the_last_choice(session, question, tab):
+    policy = order(question.front, 0)[-1]
+    tab.choose(policy)
+    session.question()
+    tab.follow()
+    tab.view = replace(tab.view, question=None)  # as it is while a generation is trained
+    lay_out(tab, tab.view.front[-1].id)
+    tab.stop()
+    assert tab.ending.question is None and tab.ending.policies == (last_choice(tab.view).id,)
+    tab.end(tab.ending.policies[0])
+    assert session.view.asking == "end"
+
+
 def test_generations_without_a_question_are_asked_for_anew_each_time(session, question, tab):
     tab.go_on_for(2)
     tab.follow()
@@ -103,7 +276,7 @@ def test_generations_without_a_question_are_asked_for_anew_each_time(session, qu
 
 def test_keeping_chooses_the_last_choice_again(session, question, tab):
     tab.keep()  # there is none yet
-    assert session.view.question is question
+    assert session.view.question is question and not chosen_so_far(session)
     tab.choose(question.front[0].id)
     session.question()
     tab.follow()
@@ -114,6 +287,7 @@ def test_keeping_chooses_the_last_choice_again(session, question, tab):
 
 def test_one_looks_along_the_axis_to_the_right_and_stops_at_its_ends(question, tab):
     right = order(question.front, 0)
+    lay_out(tab)
     for step, expected in ((1, right[0]), (1, right[1]), (-1, right[0]), (-1, right[0])):
         tab.look_along(step)
         assert tab.selection.focus == expected
@@ -152,9 +326,10 @@ def test_what_is_new_is_shown(watching):
 
 
 def test_a_policy_that_has_gone_says_so(watching):
+    focus = watching.tab.selection.focus
     watching.tab.look_at(12345)
     assert watching.said == [("hint", "Policy 12345 is no longer in the front.")]
-    assert watching.tab.selection.focus is None
+    assert watching.tab.selection.focus == focus
 
 
 def test_stepping_back_and_opening_say_what_they_wait_for_and_why_they_fail(session, watching):
@@ -190,6 +365,7 @@ def test_enautilus_is_taken_step_by_step_and_told_when_it_has_moved_on(watching)
 
 def test_a_pair_is_what_is_laid_out_first(tab, question):
     first, second, third, *_ = [policy.id for policy in question.front]
+    lay_out(tab)
     assert tab.pair is None
     tab.look_at(second)
     assert tab.pair is None
@@ -204,8 +380,7 @@ def test_a_pair_is_what_is_laid_out_first(tab, question):
 def test_a_blend_is_scored_and_named(watching, question):
     tab = watching.tab
     first, second = (policy.id for policy in question.front[:2])
-    tab.look_at(first)
-    tab.look_at(second)
+    lay_out(tab, first, second)
     ends = [asyncio.run(tab.score_between(tab.view.run, first, second, per_cent)) for per_cent in (0, 100)]
     between = asyncio.run(tab.score_between(tab.view.run, first, second, 40))
     assert not np.array_equal(between.mean, ends[0].mean) and not np.array_equal(ends[0].mean, ends[1].mean)

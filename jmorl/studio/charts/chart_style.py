@@ -12,15 +12,16 @@ __all__ = ["BLUE", "GREEN", "GREY", "INK", "ORANGE", "PALE", "RED"]
 
 LETTER_COLOURS = {"A": RED, "B": GREEN, "C": "#AA4499"}  # differ in lightness, too
 TEXT = {"fontFamily": "Roboto, sans-serif", "fontSize": 11, "color": INK}
-# Text that is drawn, not HTML: nothing that a name holds is markup. Values as p.value, their names as the dimensions'.
+# Text that is drawn, not HTML: nothing that a name holds is markup. Of points [policy, values..., note].
 TOOLTIP_TEXT = """
 (p) => {
+  const names = %s;
   const number = (v) => v.toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
-  const values = p.dimensionNames.slice(1, -1).map((name, i) => `${name}  ${number(p.value[i + 1])}`);
-  return [`policy ${p.value[0]}`, ...values, p.value[p.value.length - 1]].filter(Boolean).join("\\n");
+  const values = names.map((name, i) => `${name}  ${number(p.value[i + 1])}`);
+  return [`policy ${p.value[0]}`, ...values, p.value[names.length + 1]].filter(Boolean).join("\\n");
 }
 """
-# The same for lines of parallel coordinates, [values..., policy], whose dimensions have no names: they come first.
+# The same for lines of parallel coordinates, [values..., policy].
 LINE_TOOLTIP = """
 (p) => {
   const names = %s;

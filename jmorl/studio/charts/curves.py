@@ -18,7 +18,7 @@ def curve_options(view: View) -> dict[str, Any]:
         "xAxis": {
             "type": "category",
             "data": [str(generation.number) for generation in view.generations],
-            "name": "generation (0: warm-up)",
+            "name": "round (0: warm-up)",
             "nameLocation": "middle",
             "nameGap": 24,
             "nameTextStyle": TEXT,

@@ -1,5 +1,6 @@
 """The front as points in two of its objectives, with its bounds, earlier fronts, choices and expectations."""
 
+import json
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,10 @@ import numpy as np
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion
 from jmorl.display.limits import around, inside
-from jmorl.display.text import plural
+from jmorl.display.text import number, objective_label
 from jmorl.methods.base import Prospect
 from jmorl.search.bounds import within
+from jmorl.search.policy import Policy
 from jmorl.search.scaling import core
 from jmorl.studio.charts.chart_style import (
     BLUE,
@@ -32,48 +34,47 @@ STAR = "path://M10 0 L12.9 6.9 L20 7.6 L14.6 12.4 L16.2 20 L10 16 L3.8 20 L5.4 1
 GHOSTS = 6  # earlier fronts
 IN_FORCE = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
 PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
+RULED_OUT = {"color": INK, "opacity": 0.12}
 MANY = 300  # policies; more are drawn smaller
 
 
 def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
     """Draw what stays while policies are looked at; `axes` are the objectives to the right and upwards."""
     limits = _limits(view, asked)
-    far_out = int((~inside(view.values, limits)).sum()) if view.front else 0
-    note = f"{plural(far_out, 'policy')} far out, in the table only" if far_out else ""
     return {
-        **_frame(view, axes, limits, visible=True),
-        "title": {"text": note, "right": 18, "top": 0, "textStyle": {**TEXT, "color": GREY, "fontWeight": "normal"}},
+        **_frame(view, axes, limits),
         "series": [
             _area("bounds", view.bounds, axes, limits, IN_FORCE),
             _ghosts(view, axes),
-            _members(view, axes, within_bounds=False),
-            _members(view, axes, within_bounds=True),
+            _members(view, axes, limits, within_bounds=False),
+            _members(view, axes, limits, within_bounds=True),
+            _far_out(view, axes, limits),
             _journey(view, axes),
             _result(view, axes),
         ],
     }
 
 
-def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
-    """Draw what follows from the selection: a chart to put over the other, so that little is drawn anew."""
+def front_marks(
+    view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None
+) -> list[dict[str, Any]]:
+    """Draw what follows from the selection: series over the others, so that little is sent anew."""
     limits = _limits(view, asked)
     prospect = selection.prospect if view.question else None  # what is answered brings nothing any more
     bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
-    return {
-        **_frame(view, axes, limits, visible=False),
-        "series": [
-            _area("bounds that would follow", bounds, axes, limits, PROPOSED),
-            _expected(prospect, axes),
-            _wanted(view, selection, axes),
-            _laid_out(view, selection, axes),
-            _points(asked, axes),
-        ],
-    }
+    return [
+        _ruled_out(selection, axes, limits),
+        _area("bounds that would follow", bounds, axes, limits, PROPOSED),
+        _expected(prospect, axes),
+        _wanted(view, selection, axes, limits),
+        _laid_out(view, selection, axes, limits),
+        _points(asked, axes),
+    ]
 
 
-def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
-    """Return the options that give both charts the same axes."""
-    visible = visible and bool(view.front)
+def _frame(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
+    """Return the options of the axes."""
+    visible = bool(view.front)
     x, y = (
         _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
     )
@@ -127,29 +128,81 @@ def _scatter(name: str, data: list[Any], axes: tuple[int, int], **style: Any) ->
     }
 
 
-def _members(view: View, axes: tuple[int, int], within_bounds: bool) -> dict[str, Any]:
-    """Draw the members of the front within the bounds, or those outside them; pale if they cannot be chosen."""
-    kept = within(view.values, view.bounds) == within_bounds
+def _members(view: View, axes: tuple[int, int], limits: np.ndarray, within_bounds: bool) -> dict[str, Any]:
+    """Draw the members of the front within the bounds, or those outside them, as far as the chart reaches."""
+    kept = (within(view.values, view.bounds) == within_bounds) & _in_chart(view.values, axes, limits)
     data = [
-        [policy.id, *values, "" if within_bounds else "outside the bounds"]
+        [policy.id, *values, "" if within_bounds else "outside the search area"]
         for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
         if shown
     ]
-    open_to_choice = within_bounds or view.question is None or view.question.purpose == "steer"
-    style = {"color": BLUE} if within_bounds else {"color": "#ffffff", "borderWidth": 1.5}
-    border = {"borderColor": "#ffffff"} if within_bounds else {"borderColor": BLUE if open_to_choice else PALE}
-    names = ["policy", *(f"{each.label} ({each.unit})" for each in view.objectives), "note"]
+    style: dict[str, Any] = {"color": BLUE, "borderColor": "#ffffff"}
+    if not within_bounds:
+        style = {"color": "#ffffff", "borderColor": BLUE, "borderWidth": 1.5}
     return _scatter(
         "within the bounds" if within_bounds else "outside the bounds",
         data,
         axes,
-        dimensions=names,
-        tooltip={":formatter": TOOLTIP_TEXT},
+        tooltip=_tooltip(view),
         symbolSize=(9 if within_bounds else 7) if len(view.front) <= MANY else 5,
-        itemStyle={**style, **border},
+        itemStyle=style,
         emphasis={"scale": 1.6},
         z=4 if within_bounds else 3,
     )
+
+
+def _far_out(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
+    """Draw the members of the front beyond the chart at its edge, as arrows, with the values that are far out."""
+    data = []
+    for policy in (policy for policy in view.front if not _in_chart(policy.values[None], axes, limits)[0]):
+        beyond = [int(np.sign(policy.values[axis] - np.clip(policy.values[axis], *limits[:, axis]))) for axis in axes]
+        told = [
+            f"{view.objectives[axis].label} {number(float(policy.values[axis]))}".replace("-", "−")
+            for axis, side in zip(axes, beyond, strict=True)
+            if side
+        ]
+        position = {-1: "right", 1: "left"}.get(beyond[0]) or {-1: "top", 1: "bottom"}[beyond[1]]
+        data.append(
+            {
+                "value": _clipped(policy, axes, limits, "far out"),
+                "symbolRotate": round(float(np.degrees(np.arctan2(-beyond[0], beyond[1])))),
+                "label": {"formatter": ", ".join(told), "position": position},
+            }
+        )
+    return _scatter(
+        "far out",
+        data,
+        axes,
+        encode=_clipped_encode(view),
+        tooltip=_tooltip(view),
+        symbol="arrow",
+        symbolSize=13,
+        itemStyle={"color": BLUE, "borderColor": "#ffffff"},
+        label={"show": True, "fontSize": 10, "color": INK},
+        labelLayout={"hideOverlap": True},
+        clip=False,
+        z=5,
+    )
+
+
+def _in_chart(values: np.ndarray, axes: tuple[int, int], limits: np.ndarray) -> np.ndarray:
+    """Which of the vectors [N, M] lie within the axes of the chart, [N]."""
+    return inside(values[:, list(axes)], limits[:, list(axes)])
+
+
+def _clipped(policy: Policy, axes: tuple[int, int], limits: np.ndarray, note: str = "") -> list[Any]:
+    """Return a point that has its place after the note: its values, or the edge of the chart."""
+    place = [float(np.clip(policy.values[axis], *limits[:, axis])) for axis in axes]
+    return [policy.id, *plain(policy.values)[0], note, *place]
+
+
+def _clipped_encode(view: View) -> dict[str, int]:
+    """Return where `_clipped` has the place of a point."""
+    return {"x": len(view.objectives) + 2, "y": len(view.objectives) + 3}
+
+
+def _tooltip(view: View) -> dict[str, str]:
+    return {":formatter": TOOLTIP_TEXT % json.dumps([objective_label(each) for each in view.objectives])}
 
 
 def _ghosts(view: View, axes: tuple[int, int]) -> dict[str, Any]:
@@ -200,6 +253,20 @@ def _area(
     return {"type": "scatter", "id": name, "name": name, "data": [], "silent": True, "markArea": area}
 
 
+def _ruled_out(selection: Selection, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
+    """Draw the area that does not reach what somebody wants to be reached."""
+    x, y = axes
+    (left, bottom), (right, top) = limits[:, list(axes)].tolist()
+    least = selection.limits or (-np.inf,) * limits.shape[1]
+    areas = []
+    if least[x] > left:
+        areas.append([{"coord": [left, bottom]}, {"coord": [min(least[x], right), top]}])
+    if least[y] > bottom:
+        areas.append([{"coord": [left, bottom]}, {"coord": [right, min(least[y], top)]}])
+    area = {"silent": True, "itemStyle": RULED_OUT, "data": areas}
+    return {"type": "scatter", "id": "limits", "name": "limits", "data": [], "silent": True, "markArea": area}
+
+
 def _expected(prospect: Prospect | None, axes: tuple[int, int]) -> dict[str, Any]:
     expected = prospect.expected if prospect else np.zeros((0, 0))
     data = [[0, *values, ""] for values in plain(expected)] if len(expected) else []
@@ -207,15 +274,16 @@ def _expected(prospect: Prospect | None, axes: tuple[int, int]) -> dict[str, Any
     return _scatter("expected by the model", data, axes, silent=True, z=2, **style)
 
 
-def _wanted(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
+def _wanted(view: View, selection: Selection, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
     """Draw rings around the policies that are better in the objective asked for."""
     more = set(wanted(view, selection) or ())
-    data = [[policy.id, *plain(policy.values)[0], ""] for policy in view.front if policy.id in more]
+    data = [_clipped(policy, axes, limits) for policy in view.front if policy.id in more]
     style = {"color": "transparent", "borderColor": ORANGE, "borderWidth": 2.5}
-    return _scatter("more of an objective", data, axes, silent=True, symbolSize=14, itemStyle=style, z=6)
+    look = {"silent": True, "symbolSize": 14, "itemStyle": style, "clip": False, "z": 6}
+    return _scatter("more of an objective", data, axes, encode=_clipped_encode(view), **look)
 
 
-def _laid_out(view: View, selection: Selection, axes: tuple[int, int]) -> dict[str, Any]:
+def _laid_out(view: View, selection: Selection, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
     data = []
     for policy_id, letter in selection.letters.items():
         policy = view.policy(policy_id)
@@ -223,14 +291,19 @@ def _laid_out(view: View, selection: Selection, axes: tuple[int, int]) -> dict[s
             focused = policy_id == selection.focus
             data.append(
                 {
-                    "value": [policy_id, *plain(policy.values)[0], ""],
+                    "value": _clipped(policy, axes, limits),
                     "label": {"formatter": letter},
                     "symbolSize": 22 if focused else 17,
-                    "itemStyle": {"color": LETTER_COLOURS[letter], "borderColor": INK if focused else "#ffffff"},
+                    "itemStyle": {
+                        "color": LETTER_COLOURS[letter],
+                        "borderColor": INK if focused else "#ffffff",
+                        "opacity": 1,
+                    },
                 }
             )
     label = {"show": True, "position": "inside", "color": "#ffffff", "fontWeight": "bold", "fontSize": 11}
-    return _scatter("laid out", data, axes, silent=True, label=label, z=7, itemStyle={"borderWidth": 1.5})
+    look = {"silent": True, "label": label, "clip": False, "z": 7, "itemStyle": {"borderWidth": 1.5}}
+    return _scatter("laid out", data, axes, encode=_clipped_encode(view), **look)
 
 
 def _points(asked: PointQuestion | None, axes: tuple[int, int]) -> dict[str, Any]:

@@ -8,7 +8,18 @@ import numpy as np
 from jmorl.display.limits import around
 from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
-from jmorl.studio.charts.chart_style import BLUE, GREY, INK, LETTER_COLOURS, LINE_TOOLTIP, PALE, TEXT, base, plain
+from jmorl.studio.charts.chart_style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    LETTER_COLOURS,
+    LINE_TOOLTIP,
+    PALE,
+    TEXT,
+    base,
+    plain,
+)
 from jmorl.studio.selection import Selection
 from jmorl.studio.view import View
 
@@ -17,7 +28,7 @@ def parallel_options(view: View) -> dict[str, Any]:
     """Draw what stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
     inside = within(view.values, view.bounds)
     return {
-        **_frame(view, visible=True),
+        **_frame(view),
         "series": [
             _lines("outside the bounds", view, ~inside, PALE),
             _lines("within the bounds", view, inside, BLUE),
@@ -26,8 +37,8 @@ def parallel_options(view: View) -> dict[str, Any]:
     }
 
 
-def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
-    """Draw the lines of the policies laid out: a chart to put over the other."""
+def parallel_marks(view: View, selection: Selection) -> list[dict[str, Any]]:
+    """Draw the lines of the policies laid out, over the others."""
     lines = [
         {
             "value": [*plain(policy.values)[0], policy.id],
@@ -40,15 +51,20 @@ def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
         for policy_id, letter in selection.letters.items()
         if (policy := view.policy(policy_id))
     ]
-    series = {"type": "parallel", "id": "laid out", "name": "laid out", "data": lines, "silent": True}
-    return {**_frame(view, visible=False), "series": [series]}
+    prospect = selection.prospect if view.question else None
+    lowest = _axes_limits(view)[0]
+    proposed = plain(np.maximum(prospect.bounds, lowest)) if prospect and np.isfinite(prospect.bounds).all() else []
+    dashed = {"color": GREEN, "width": 1.5, "type": "dashed", "opacity": 1}
+    return [
+        _series("bounds that would follow", proposed, lineStyle=dashed, silent=True, z=4),
+        _series("laid out", lines, silent=True, z=5),
+    ]
 
 
-def _frame(view: View, visible: bool) -> dict[str, Any]:
-    """Return the options that give both charts the same axes."""
-    shown = np.concatenate([view.values, view.bounds[None]]) if _bounded(view) else view.values
-    limits = around(shown) if len(shown) else np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
-    visible = visible and bool(view.front)
+def _frame(view: View) -> dict[str, Any]:
+    """Return the options of the axes."""
+    limits = _axes_limits(view)
+    visible = bool(view.front)
     text = {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False}
     axes = [
         {
@@ -68,6 +84,14 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
     return {**base(), "parallel": {"left": 70, "right": 90, "top": 34, "bottom": 14}, "parallelAxis": axes}
 
 
+def _axes_limits(view: View) -> np.ndarray:
+    """Return the limits [2, M] of the axes: around the front and the bounds in force."""
+    shown = np.concatenate([view.values, view.bounds[None]]) if _bounded(view) else view.values
+    if not len(shown):
+        return np.stack([np.zeros(len(view.objectives)), np.ones(len(view.objectives))])
+    return around(shown)
+
+
 def _bounded(view: View) -> bool:
     return bool(view.front) and bool(np.isfinite(view.bounds).all())
 
@@ -81,18 +105,14 @@ def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, An
     opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
     style = {"color": colour, "width": 1.2, "opacity": opacity}
     tooltip = {":formatter": LINE_TOOLTIP % json.dumps([objective_label(each) for each in view.objectives])}
-    return {"type": "parallel", "id": name, "name": name, "data": data, "lineStyle": style, "tooltip": tooltip, "z": 2}
+    return _series(name, data, lineStyle=style, tooltip=tooltip, z=2)
 
 
 def _bounds(view: View) -> dict[str, Any]:
     data = [plain(view.bounds)[0]] if _bounded(view) else []
     style = {"color": INK, "width": 1.5, "type": "dashed", "opacity": 1}
-    return {
-        "type": "parallel",
-        "id": "bounds",
-        "name": "bounds",
-        "data": data,
-        "lineStyle": style,
-        "silent": True,
-        "z": 4,
-    }
+    return _series("bounds", data, lineStyle=style, silent=True, z=4)
+
+
+def _series(name: str, data: list[Any], **look: Any) -> dict[str, Any]:
+    return {"type": "parallel", "id": name, "name": name, "data": data, **look}

@@ -58,6 +58,8 @@ class BetweenPanel:
             self.place, self.per_cent = place, 50
             self.slider.props["value"] = self.per_cent
             self._play()
+        elif place:
+            self._name()
 
     def _moved(self, event: GenericEventArguments) -> None:
         """Follow the dial."""
@@ -71,7 +73,7 @@ class BetweenPanel:
         """Show the blend that the dial is at, and have it scored."""
         assert self.place is not None
         view = self.tab.view
-        self.heading.set_text(texts.blend_name(self.tab.selection, self.place[1:], self.per_cent))
+        self._name()
         digits = decimals(view.values) if view.front else [2] * len(view.objectives)
         self.player.props["src"] = self._address
         self.player.props["objectives"] = [f"{each.label} so far" for each in view.objectives]
@@ -80,6 +82,11 @@ class BetweenPanel:
         self.player.update()
         self.scores.set_text(texts.SCORING)
         background_tasks.create(self.show_scores())
+
+    def _name(self) -> None:
+        """Say where the dial is; the letters of its policies may change."""
+        assert self.place is not None
+        self.heading.set_text(texts.blend_name(self.tab.selection, self.place[1:], self.per_cent))
 
     def _save(self) -> None:
         ui.download(f"{self._address}.npz")

@@ -66,6 +66,7 @@ class Card:
             ui.button(icon="close", on_click=lambda: tab.put_away(policy.id)).props(
                 f'flat dense round size=xs aria-label="put policy {policy.id} away"'
             )
+        self.standing = ui.label().classes("standing")
         player = Player()
         digits = decimals(view.values) if view.front else [2] * len(view.objectives)
         player.props["src"] = f"/episodes/{view.run}/{policy.id}"
@@ -80,15 +81,18 @@ class Card:
                     ui.label(score)
         if policy.raw is not None:
             ui.label(texts.raw_returns(view, policy)).classes("consequences")
-        self.consequences = ui.label().classes("consequences")
-        self.choose = ui.button(on_click=lambda: tab.choose(policy.id)).props("no-caps dense").classes("choose")
+        self.beside = ui.label().classes("consequences beside")
+        self.remark = ui.label().classes("consequences")
+        with ui.element("div").classes("choice"):
+            self.choose = ui.button(on_click=lambda: tab.choose(policy.id)).props("no-caps dense").classes("choose")
 
     def show(self) -> None:
         """Show what depends on the question and on the focus."""
         view, selection = self.tab.view, self.tab.selection
         focused = selection.focus == self.policy.id
-        prospect = selection.prospects.get(self.policy.id) if view.question else None
-        self.consequences.set_text(texts.consequences(view, prospect, self.policy))
+        self.standing.set_text(texts.standing(view, self.policy))
+        self.beside.set_text(texts.beside(view, selection, self.policy))
+        self.remark.set_text(texts.remark(view, self.policy))
         self.choose.set_visibility(view.choosable(self.policy.id))
         final = view.question is not None and view.question.purpose == "final"
         self.choose.set_text(f"{self.letter} is the result" if final else f"Choose {self.letter}")

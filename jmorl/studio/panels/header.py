@@ -16,7 +16,8 @@ class Header:
         self.tab = tab
         self.shown = Shown()
         self.next_tick = 0.0  # on the session's clock
-        ui.label("jmorl studio").classes("brand")
+        with ui.element("h1").classes("brand"):
+            ui.label("jmorl studio")
         self.run_name = ui.label().classes("run-name")
         self.phase = ui.label().classes("phase").props('role="status"')
         with ui.element("div").classes("meter").props('role="progressbar" aria-label="Budget used"'):

@@ -56,20 +56,21 @@ class HistoryPanel:
                     ui.label(f"{_open_question(view)}: open").classes("open-step")
 
     def _add_step(self, branch: Branch, step: DecisionRecord) -> None:
-        more = f", then {step.generations} generations" if step.generations > 1 else ", and stop" if step.stop else ""
+        more = f", then {step.generations} rounds" if step.generations > 1 else ", and stop" if step.stop else ""
         text = f"{_title(step.purpose, step.generation)}: policy {step.policy} ({self._values(step.values)})"
         shown = [f"policy {each.policy}: {self._values(each.values)}" for each in step.shown[:LISTED]]
         if len(step.shown) > LISTED:
             shown.append(f"and {len(step.shown) - LISTED} more")
         with ui.element("div").classes("step"):
-            with ui.label(f"{text} of {plural(len(step.shown), 'policy')}{more}"):
+            by_whom = ", chosen for you" if step.stand_in else ""
+            with ui.label(f"{text} of {plural(len(step.shown), 'policy')}{more}{by_whom}"):
                 if shown:
                     ui.tooltip("\n".join(shown)).classes("shown")
             self._add_way_back(branch, step.generation)
         for generation in range(step.generation + 1, step.generation + step.generations):
             if generation - 1 in branch.checkpoints:
                 with ui.element("div").classes("step"):
-                    ui.label(f"Generation {generation}: not asked").classes("branch-state")
+                    ui.label(f"Round {generation}: not asked").classes("branch-state")
                     self._add_way_back(branch, generation)
 
     def _add_way_back(self, branch: Branch, generation: int) -> None:
@@ -87,11 +88,11 @@ def _open_question(view: View) -> str:
 
 
 def _title(purpose: str, generation: int) -> str:
-    return "The end" if purpose == "final" else f"Generation {generation}"
+    return "The end" if purpose == "final" else f"Round {generation}"
 
 
 def _state(branch: Branch, is_open: bool) -> str:
-    parts = [f"leaves after generation {branch.leaves_after}"] if branch.parent else []
+    parts = [f"leaves after round {branch.leaves_after}"] if branch.parent else []
     if is_open:
         parts.append("open")
     parts.append("ended" if branch.finished else "not ended")

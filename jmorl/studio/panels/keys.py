@@ -42,6 +42,8 @@ class Keys:
             self.list.open()
         elif key == "c" and focus is not None:
             self.tab.choose(focus)
+        elif key == "=" and texts.offers_equal(self.tab.view):
+            self.tab.say_equal()
         elif key == "x" and focus is not None:
             self.tab.put_away(focus)
         elif key == "k":

@@ -54,7 +54,7 @@ class NavigationPanel:
     def _add_question(self, dialogue: Dialogue, question: PointQuestion) -> None:
         state = question.state
         ui.label(
-            f"On the front after generation {question.generation}: {int(state.reachable.sum())} of "
+            f"On the front after round {question.generation}: {int(state.reachable.sum())} of "
             f"{plural(len(question.front), 'policy')} reachable. Which point do you prefer? A bar goes from the worst "
             "to the best value that stays reachable from it."
         ).classes("explanation")

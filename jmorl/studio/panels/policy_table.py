@@ -8,7 +8,7 @@ from jmorl.display.text import objective_label
 from jmorl.search.bounds import within
 from jmorl.studio.charts.chart_style import decimals, plain
 from jmorl.studio.panels.panel import Shown
-from jmorl.studio.selection import wanted
+from jmorl.studio.selection import listed
 from jmorl.studio.tab import Tab
 
 
@@ -42,11 +42,11 @@ class PolicyTable:
         self.grid.update()
 
     def _send_marks(self) -> None:
-        """Send which policies are laid out, and which are better in the objective asked for."""
+        """Send which policies are laid out, and which are listed: within the limits, better in what is asked for."""
         view, selection = self.tab.view, self.tab.selection
         by = None if selection.more_of is None or selection.more_of == self.by else selection.more_of + 1
         self.by = selection.more_of
-        self.grid.run_method("lay_out", selection.letters, selection.focus, wanted(view, selection), by)
+        self.grid.run_method("lay_out", selection.letters, selection.focus, listed(view, selection), by)
 
     def _columns(self) -> list[dict[str, Any]]:
         view = self.tab.view
@@ -64,7 +64,7 @@ class PolicyTable:
         return [
             {"label": "policy", "hint": "number of the policy"},
             *values,
-            {"label": "gen.", "hint": "generation it was born in; 0 is the warm-up"},
+            {"label": "round", "hint": "in which it was trained; 0 is the warm-up"},
         ]
 
     def _rows(self) -> list[list[Any]]:

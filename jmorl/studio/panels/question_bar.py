@@ -3,29 +3,23 @@
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
-from jmorl.decision.answers import Answer
-from jmorl.decision.protocol import Question
 from jmorl.studio import texts
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
+ROUNDS = 5  # that a run which has ended goes on for, if somebody does not say otherwise
+
 
 class QuestionBar:
-    """The question, with buttons to see more of an objective, keep the last choice, or stop; at the end, the result."""
+    """The question, with the ways to answer it; between two questions, and at the end, what can be done then."""
 
     def __init__(self, tab: Tab):
         self.tab = tab
-        self.question: Question | None = None  # the one shown
-        self.ending: Answer | None = None  # its answer that ends the run, if that is confirmed
+        self.rounds = ROUNDS
         self.asked, self.offered = Shown(), Shown()
         with ui.element("section").classes("bar question").props('aria-label="The question"'):
             self.heading = ui.label().classes("heading").props('role="status" aria-live="polite"')
             self.buttons = ui.element("div").classes("buttons")
-        with ui.dialog().bind_value_to(tab, "covered") as self.stopping, ui.card():
-            self.stop_text = ui.label()
-            with ui.row():
-                ui.button("End the run", on_click=self._stop).props("no-caps color=primary")
-                ui.button("Go on", on_click=self.stopping.close).props("flat no-caps")
 
     def show(self) -> None:
         """Show what is asked; replace the buttons only where others are due: somebody may be about to press one."""
@@ -33,11 +27,10 @@ class QuestionBar:
         if not self.asked.is_new(view, selection):
             return
         self.heading.set_text(texts.heading(view, selection))
-        if view.question is not self.question:
-            self.question = view.question
-            self.stopping.close()
-        at_rest, has_front = view.timeline is None, bool(view.front)
-        if self.offered.is_new(view.run, view.question, view.result, at_rest, has_front, selection.more_of):
+        at_rest, has_front, chosen = view.timeline is None, bool(view.front), view.previous is not None
+        between = at_rest, has_front, chosen, view.asking, view.stand_in, view.rounds_to_question
+        state = view.run, view.question, view.result, *between
+        if self.offered.is_new(*state, selection.more_of):
             self._add_buttons()
 
     def _add_buttons(self) -> None:
@@ -52,6 +45,8 @@ class QuestionBar:
                 self._add_result()
             elif view.timeline is None:
                 ui.button("Go on with this run", on_click=self._go_on).props("no-caps dense color=primary")
+            elif view.generations:
+                self._add_interruptions()
 
     def _add_more(self) -> None:
         ui.label("Better in")
@@ -61,17 +56,35 @@ class QuestionBar:
             button.props(f"no-caps dense {'unelevated' if pressed else 'outline'} aria-pressed={str(pressed).lower()}")
 
     def _add_answers(self) -> None:
-        question, previous = self.tab.view.question, self.tab.view.previous
-        assert question
-        if previous and self.tab.view.choosable(previous.id):
-            keep = ui.button(f"Keep policy {previous.id}", on_click=self.tab.keep).props("no-caps dense outline")
-            keep.tooltip("your last choice")
-        if question.purpose == "steer":
+        view = self.tab.view
+        assert view.question
+        keep = texts.keep(view)
+        if keep:
+            ui.button(keep, on_click=self.tab.keep).props("no-caps dense outline").tooltip(texts.KEEP_HINT)
+        left = view.timeline.left if view.timeline else 1
+        if texts.offers_equal(view):
+            ui.button("No difference", on_click=self.tab.say_equal).props("no-caps dense outline")
+        if view.question.purpose != "steer":
+            return
+        if left > 1:
             ui.label("then go on for")
-            number = ui.number(value=self.tab.generations, min=1, max=99, format="%d", on_change=self._go_on_for)
-            number.props('dense outlined aria-label="generations before the next question"').classes("count")
-            ui.label("gen.").tooltip("generations before the next question")
-            ui.button("Stop here", on_click=self._ask_to_stop).props("no-caps dense outline color=negative")
+            number = ui.number(value=self.tab.generations, min=1, max=left, format="%d", on_change=self._go_on_for)
+            number.props('dense outlined aria-label="rounds before the next question"').classes("count")
+            ui.label(f"of {left} rounds")
+        ui.button("Stop here", on_click=self.tab.stop).props("no-caps dense outline color=negative")
+
+    def _add_interruptions(self) -> None:
+        view = self.tab.view
+        rounds = view.rounds_to_question
+        if rounds is not None and not view.asking and (rounds > 1 or view.config.ask == "unsure"):
+            ask = ui.button("Ask me after this round", on_click=self.tab.ask_now).props("no-caps dense outline")
+            ask.tooltip(texts.ASK_NOW_HINT)
+        if view.stand_in:
+            back = ui.button("Choose otherwise", on_click=self._take_back).props("no-caps dense outline")
+            back.tooltip(texts.TAKE_BACK_HINT)
+        ui.button("Pause training", on_click=self.tab.pause).props("no-caps dense outline").tooltip(texts.PAUSE_HINT)
+        if view.previous and rounds is not None and view.asking != "end":
+            ui.button("Stop here", on_click=self.tab.stop).props("no-caps dense outline color=negative")
 
     def _add_result(self) -> None:
         view = self.tab.view
@@ -80,29 +93,23 @@ class QuestionBar:
         save = ui.button("Save the policy file", on_click=lambda: ui.download(address))
         save.props("no-caps dense color=primary")
         ui.button("How it came about", on_click=lambda: self.tab.turn_to(texts.HISTORY)).props("no-caps dense outline")
+        ui.button("Train on for", on_click=self._train_on).props("no-caps dense outline").tooltip(texts.TRAIN_ON_HINT)
+        number = ui.number(value=self.rounds, min=1, max=1000, format="%d", on_change=self._set_rounds)
+        number.props('dense outlined aria-label="rounds to train on for"').classes("count")
+        ui.label("rounds")
+
+    async def _take_back(self) -> None:
+        view = self.tab.view
+        await self.tab.step_back(view.run, view.choices[-1][0])
 
     def _go_on_for(self, event: ValueChangeEventArguments[float | None]) -> None:
         self.tab.go_on_for(int(event.value or 1))
 
-    def _candidate(self) -> int | None:
-        """Return the policy that a stop would end with."""
-        previous = self.tab.view.previous
-        return self.tab.selection.focus if self.tab.selection.focus is not None else previous.id if previous else None
+    def _set_rounds(self, event: ValueChangeEventArguments[float | None]) -> None:
+        self.rounds = int(event.value or 1)
 
-    def _ask_to_stop(self) -> None:
-        policy = self._candidate()
-        if policy is None or not self.tab.view.choosable(policy):
-            self.tab.tell("Look at the policy first that shall be the result, one that can be chosen.", "hint")
-            return
-        self.ending = Answer(policy, stop=True)
-        self.stop_text.set_text(f"End the run here, with policy {policy} as its result?")
-        self.stopping.open()
-
-    def _stop(self) -> None:
-        """Give the answer that was confirmed, wherever the focus is now. The dialog does not outlive its question."""
-        self.stopping.close()
-        if self.question and self.ending:
-            self.tab.answer(self.question, self.ending)
+    async def _train_on(self) -> None:
+        await self.tab.train_on(self.rounds)
 
     async def _go_on(self) -> None:
         await self.tab.switch(self.tab.view.run)
