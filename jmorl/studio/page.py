@@ -7,7 +7,7 @@ from typing import Any, Literal
 from nicegui import ui
 
 from jmorl.studio import texts
-from jmorl.studio.charts.chart_style import BLUE, RED
+from jmorl.studio.charts.chart_style import BLUE
 from jmorl.studio.panels.between import BetweenPanel
 from jmorl.studio.panels.cards import Cards
 from jmorl.studio.panels.ending import EndingDialog
@@ -36,6 +36,7 @@ SIDE: dict[str, Callable[[Tab], Panel]] = {
     texts.NAVIGATION: NavigationPanel,
     texts.BETWEEN: BetweenPanel,
 }
+DARK_RED = "#B34700"  # enough contrast for text
 KINDS: dict[Tone, Literal["warning", "negative"] | None] = {"hint": None, "warning": "warning", "failure": "negative"}
 
 
@@ -45,7 +46,8 @@ class Page:
     def __init__(self, session: Session, kept: MutableMapping[str, Any] | None = None):
         self.tab = tab = Tab(session, self._show, self._tell, kept)
         ui.add_css(STYLE)
-        ui.colors(primary=BLUE, negative=RED)
+        ui.colors(primary=BLUE, negative=DARK_RED)
+        ui.dark_mode(None)  # as the browser has it
         with ui.element("div").classes("studio") as self.root:
             with ui.element("header").classes("bar"):
                 self.panels: list[Panel] = [Header(tab)]

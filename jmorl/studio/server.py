@@ -56,6 +56,7 @@ def address(host: str, port: int, token: str | None) -> str:
 
 def serve(session: Session, host: str, port: int, token: str | None) -> None:
     """Serve the page, in a thread of its own, until something is raised here: signals are for the caller to hear."""
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True  # a bar at the top, without a name for who hears it
     app.add_middleware(Guard, host=host, token=token)
     logging.getLogger("uvicorn.error").addFilter(is_trouble)
     _add_files(session)

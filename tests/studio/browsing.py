@@ -131,6 +131,18 @@ class Tab:
         )
         return True
 
+    def barriers(self, dialog=False):
+        """Return what axe-core finds that keeps people out: rules broken, with an element that breaks each.
+
+        Of a dialog it takes the dimmed page for the ground, so that its contrasts are not judged.
+        """
+        from axe_playwright_python.sync_playwright import Axe
+
+        options = {"rules": {"color-contrast": {"enabled": False}}} if dialog else None
+        found = Axe().run(self.page, context=".q-card" if dialog else None, options=options).response["violations"]
+        worst = [each for each in found if each["impact"] in ("serious", "critical")]
+        return [(each["id"], each["nodes"][0]["html"][:200]) for each in worst]
+
     def screenshot(self, name):
         """Keep a picture, if a place for pictures is named."""
         place = os.environ.get("STUDIO_SCREENSHOTS")

@@ -334,6 +334,51 @@ def test_the_keyboard_is_enough(browser, small, tmp_path):
         assert [each["stop"] for each in decisions(path)] == [False, False, True]
 
 
+def test_nothing_keeps_anybody_out_in_any_state(browser, tmp_path):
+    """As axe-core judges; in the dark and on a phone, too."""
+    with Served("--out", tmp_path / "run", "--steps", 624_000, "--population.iterations", 4) as studio:
+        tab = Tab(browser, studio.address)
+        found = {}
+        tab.page.get_by_text("Warm-up: training 6 new agents").wait_for()
+        found["warm-up"] = tab.barriers()
+        tab.asked(1)
+        tab.page.get_by_text(re.compile("the search narrows")).wait_for()
+        found["question"] = tab.barriers()
+        for title in ("Progress", "History", "Limits", "Between", "E-NAUTILUS"):
+            tab.tab(title)
+            tab.page.get_by_role("tab", name=title, selected=True).wait_for()
+            found[title] = tab.barriers()
+        tab.page.get_by_role("button", name="Begin").click()
+        tab.page.get_by_text("Which point do you prefer").wait_for()
+        found["points"] = tab.barriers()
+        tab.page.keyboard.press("?")
+        tab.page.get_by_text("keep the last choice").wait_for()
+        found["keys"] = tab.barriers(dialog=True)
+        tab.page.keyboard.press("Escape")
+        tab.page.get_by_text("keep the last choice").wait_for(state="hidden")
+        assert tab.page.locator("h1").count() == tab.page.locator("main").count() == 1
+        tab.page.emulate_media(color_scheme="dark")
+        tab.page.locator(".body--dark").wait_for()
+        tab.page.wait_for_timeout(500)  # buttons take their new colour by and by
+        found["dark"] = tab.barriers()
+        tab.screenshot("13-dark")
+        tab.page.emulate_media(color_scheme="light")
+        tab.page.set_viewport_size({"width": 390, "height": 844})
+        tab.page.wait_for_timeout(500)
+        found["phone"] = tab.barriers()
+        tab.screenshot("14-phone")
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= 390
+        tab.page.set_viewport_size({"width": 1280, "height": 720})
+        tab.page.get_by_role("button", name="Stop here").click()
+        tab.page.get_by_text("End the run?").wait_for()
+        found["ending"] = tab.barriers(dialog=True)
+        tab.page.get_by_role("button", name="End with").first.click()
+        tab.page.get_by_text("The result is policy").wait_for()
+        found["end"] = tab.barriers()
+        assert {state: barriers for state, barriers in found.items() if barriers} == {}
+        assert not tab.problems
+
+
 def test_a_dial_leads_from_one_policy_to_another(browser, tmp_path):
     """The picture, the scores and the file follow it; the keys of the page do not move what is laid out meanwhile."""
     path = tmp_path / "dial"

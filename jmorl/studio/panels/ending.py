@@ -13,7 +13,7 @@ class EndingDialog:
     def __init__(self, tab: Tab):
         self.tab = tab
         self.shown = Shown()
-        with ui.dialog() as self.dialog, ui.card():
+        with ui.dialog().props('aria-label="End the run?"') as self.dialog, ui.card():
             ui.label(texts.END_TITLE).classes("title")
             self.text = ui.label().classes("explanation")
             self.buttons = ui.element("div").classes("endings")

@@ -14,7 +14,7 @@ class Keys:
     def __init__(self, tab: Tab):
         self.tab = tab
         ui.keyboard(self._press, ignore=["input", "select", "textarea"], repeating=True)
-        with ui.dialog().bind_value_to(tab, "covered") as self.list, ui.card():
+        with ui.dialog().props('aria-label="Keys"').bind_value_to(tab, "covered") as self.list, ui.card():
             ui.label("Keys").classes("title")
             with ui.element("dl").classes("keys"):
                 for key, what in texts.KEYS:

@@ -9,10 +9,12 @@ export default {
     <div class="policies" role="grid" aria-label="Policies" :aria-rowcount="order.length + 1" tabindex="0"
          @scroll.passive="top = $event.target.scrollTop" @keydown="press">
       <div class="policies-head" role="row">
-        <button v-for="(column, index) in columns" :key="index" type="button" role="columnheader" :title="column.hint"
-                :aria-sort="by === index ? (down ? 'descending' : 'ascending') : 'none'" @click="sort(index)">
-          {{ column.label }}<span aria-hidden="true">{{ by === index ? (down ? " ▾" : " ▴") : "" }}</span>
-        </button>
+        <div v-for="(column, index) in columns" :key="index" role="columnheader"
+             :aria-sort="by === index ? (down ? 'descending' : 'ascending') : 'none'">
+          <button type="button" :title="column.hint" @click="sort(index)">
+            {{ column.label }}<span aria-hidden="true">{{ by === index ? (down ? " ▾" : " ▴") : "" }}</span>
+          </button>
+        </div>
       </div>
       <div class="policies-body" :style="{ height: order.length * ${HEIGHT} + 'px' }">
         <div v-for="place in places" :key="rows[order[place]][0]" role="row" :aria-rowindex="place + 2"
