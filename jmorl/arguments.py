@@ -99,6 +99,7 @@ def parser() -> argparse.ArgumentParser:
 
     show = commands.add_parser("show", help="print a run's tables and draw its plots")
     show.add_argument("run", type=to_path, metavar="RUN", help="run folder")
+    show.add_argument("--html", type=to_path, metavar="FILE", help="write all of it as one page that needs no network")
 
     _add_paper(commands)
     _add_study(commands)

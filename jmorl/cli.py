@@ -384,6 +384,7 @@ def _enautilus(options: argparse.Namespace) -> None:
 
 def _show(options: argparse.Namespace) -> None:
     from jmorl.display.console import PlainConsole
+    from jmorl.report.journey import write_journey
     from jmorl.report.plots import draw_run
     from jmorl.report.tables import run_tables
     from jmorl.storage.stored_run import read_run
@@ -393,8 +394,12 @@ def _show(options: argparse.Namespace) -> None:
     for table in run_tables(stored):
         console.print(table)
     _tell_of_reference(stored)
-    for plot in draw_run(stored, Layout(options.run).plots):
+    plots = draw_run(stored, Layout(options.run).plots)
+    for plot in plots:
         console.print(f"plot: {plot}", soft_wrap=True)
+    if options.html:
+        write_journey(stored, plots, options.html)
+        console.print(f"page: {options.html}", soft_wrap=True)
 
 
 def _paper(options: argparse.Namespace) -> None:

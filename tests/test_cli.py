@@ -131,6 +131,13 @@ def test_enautilus_ends_on_a_policy_of_the_front(folder, capsys, user):
     assert json.loads(capsys.readouterr().out) == chosen
 
 
+def test_show_writes_a_page(folder, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    assert main(["show", str(folder), "--html", str(page)]) == 0
+    assert f"page: {page}" in capsys.readouterr().out and page.read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert main(["show", str(folder), "--html", str(tmp_path / "nowhere" / "page.html")]) == 1
+
+
 def test_show_prints_the_front_and_draws(folder, capsys):
     shutil.rmtree(folder / "plots")
     assert main(["show", str(folder)]) == 0

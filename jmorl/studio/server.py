@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from urllib.parse import urlencode
+from urllib.parse import quote, urlencode
 
 import jax
 from fastapi import HTTPException
@@ -21,7 +21,11 @@ from nicegui import app, ui
 from envs.drawing import NoDrawing
 from jmorl.evaluation import score_blend
 from jmorl.playback import record
+from jmorl.report.journey import journey_page
+from jmorl.report.plots import draw_run
+from jmorl.storage.layout import Layout
 from jmorl.storage.policy_file import StoredPolicy, load_policy, write_stored_policy
+from jmorl.storage.stored_run import read_run
 from jmorl.studio.between import blended
 from jmorl.studio.episodes import episode_json
 from jmorl.studio.guard import Guard
@@ -125,6 +129,34 @@ def _add_files(session: Session) -> None:
         path = _file(session, run, policy)
         return FileResponse(path, media_type="application/octet-stream", filename=f"policy-{policy}.npz")
 
+    @app.get("/fronts/{run}.csv")
+    def front(run: str) -> FileResponse:
+        path = Layout(_folder(session, run)).front
+        return FileResponse(path, media_type="text/csv", filename=f"front-{path.parent.name}.csv")
+
+    @app.get("/journeys/{run}.html")
+    def journey(run: str) -> Response:
+        folder = _folder(session, run)
+        with _not_there():
+            stored = read_run(folder)
+            page = journey_page(stored, draw_run(stored, Layout(folder).plots))
+        name = f"attachment; filename*=UTF-8''{quote(f'journey-{folder.name}.html')}"
+        return Response(page, media_type="text/html", headers={"content-disposition": name})
+
+    @app.get("/pictures/{run}.png")
+    def picture(run: str) -> FileResponse:
+        folder = _folder(session, run)
+        with _not_there():
+            drawn = draw_run(read_run(folder), Layout(folder).plots)
+        return FileResponse(drawn[0], media_type="image/png", filename=f"front-{folder.name}.png")
+
+
+def _folder(session: Session, run: str) -> Path:
+    folder = session.folder(run)
+    if folder is None or not Layout(folder).front.is_file():
+        raise HTTPException(404, "there is no such run, or it has no front yet")
+    return folder
+
 
 def _file(session: Session, run: str, policy: int) -> Path:
     path = session.policy_file(run, policy)
@@ -138,7 +170,7 @@ def _not_there() -> Iterator[None]:
     """Turn what cannot be given into an answer that says why."""
     try:
         yield
-    except (NoDrawing, ValueError) as error:
+    except (NoDrawing, ValueError, OSError) as error:
         raise HTTPException(404, str(error)) from error
 
 

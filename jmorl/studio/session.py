@@ -169,16 +169,20 @@ class Session:
 
         None if there is none.
         """
-        member = next((each for each in self.history() if each.run == run), None)
-        if member is None:
+        folder = self.folder(run)
+        if folder is None:
             return None
-        layout = Layout(member.path)
+        layout = Layout(folder)
         if layout.result.exists():
             with suppress(PolicyFileError):
                 if load_policy(layout.chosen).header["id"] == policy:
                     return layout.chosen
         path = layout.policy(policy)
         return path if path.is_file() else None
+
+    def folder(self, run: str) -> Path | None:
+        """Return the folder of a run in the history; None if there is none."""
+        return next((member.path for member in self.history() if member.run == run), None)
 
     def files_of_pair(self, run: str, first: int, second: int) -> tuple[Path, Path]:
         """Return the files of two archived policies. Raises ValueError if there are none."""

@@ -27,6 +27,12 @@ INTRODUCTION = (
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
 ASK_NOW_HINT = "The next question comes when this round is over."
 TAKE_BACK_HINT = "You are asked the question that was answered for you, in a new branch."
+MORE_FILES = {
+    "The front as a table (CSV)": "/fronts/{run}.csv",
+    "The front as a picture (PNG)": "/pictures/{run}.png",
+    "The journey as a page (HTML)": "/journeys/{run}.html",
+}
+HOW_TO = "The policy file is saved. Put it beside your program, and use it with NumPy alone:"
 PAUSE_HINT = "The run stops when this round is over, and can go on from there at any time."
 TRAIN_ON_HINT = "A new branch goes on where this run ended. This run and its result stay as they are."
 END_TITLE = "End the run?"

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,6 +125,18 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
             tab.page.get_by_role("button", name="Save the policy file").click()
         saved = tmp_path / "saved.npz"
         download.value.save_as(saved)
+        tab.page.get_by_text(f'load_policy("policy-{result}.npz")').wait_for()
+        tab.page.get_by_role("button", name="Close").click()
+        for what, kind, start in (
+            ("table", "csv", b"policy,"),
+            ("picture", "png", b"\x89PNG"),
+            ("page", "html", b"<!doc"),
+        ):
+            tab.page.get_by_role("button", name="Save more").click()
+            with tab.page.expect_download() as download:
+                tab.page.get_by_text(re.compile(f"as a {what}")).click()
+            assert download.value.suggested_filename.endswith(f"first-2.{kind}")
+            assert Path(download.value.path()).read_bytes().startswith(start)
         tab.page.get_by_role("button", name="How it came about").click()
         tab.page.get_by_role("tab", name="History", selected=True).wait_for()
         assert not tab.problems

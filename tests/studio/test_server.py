@@ -5,6 +5,7 @@ import io
 import json
 import logging
 import shutil
+from urllib.parse import quote
 
 import httpx
 import numpy as np
@@ -96,6 +97,20 @@ def test_the_policy_file_is_served_whole(studio, runs, chosen):
     assert json.loads(str(np.load(io.BytesIO(answer.content))["header"]))["id"] == chosen
 
 
+@pytest.mark.parametrize(
+    ("address", "kind", "start"),
+    [
+        ("/fronts/{}.csv", "text/csv", b"policy,"),
+        ("/pictures/{}.png", "image/png", b"\x89PNG"),
+        ("/journeys/{}.html", "text/html", b"<!doctype html>"),
+    ],
+)
+def test_what_is_saved_of_a_run_is_named_after_its_folder_whatever_that_is_called(studio, runs, address, kind, start):
+    answer = httpx.get(studio.address + address.format(run_of(runs)))
+    assert answer.headers["content-type"].startswith(kind) and answer.content.startswith(start)
+    assert quote(NAME) in answer.headers["content-disposition"] and NAME.encode() not in answer.content
+
+
 @pytest.fixture(scope="module")
 def pair(runs):
     """Two policies of the front."""
@@ -137,6 +152,9 @@ def test_what_is_no_blend_is_refused_with_a_reason(studio, runs, pair):
         "/policies/RUN/-1.npz",
         "/policies/RUN/99999.npz",
         "/policies/another/1.npz",
+        "/fronts/another.csv",
+        "/pictures/another.png",
+        "/journeys/..%2Fsecret.html",
         "/episodes/RUN/..%2F..%2Fmanifest.json",
         "/episodes/../1",
         "/manifest.json",

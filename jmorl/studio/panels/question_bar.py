@@ -3,6 +3,7 @@
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
+from jmorl.report.journey import how_to
 from jmorl.studio import texts
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
@@ -20,6 +21,11 @@ class QuestionBar:
         with ui.element("section").classes("bar question").props('aria-label="The question"'):
             self.heading = ui.label().classes("heading").props('role="status" aria-live="polite"')
             self.buttons = ui.element("div").classes("buttons")
+        how_to = ui.dialog().props('aria-label="How to use the policy"')
+        with how_to.bind_value_to(tab, "covered") as self.how_to, ui.card():
+            ui.label(texts.HOW_TO)
+            self.lines = ui.element("pre").classes("lines-of-python")
+            ui.button("Close", on_click=self.how_to.close).props("flat no-caps")
 
     def show(self) -> None:
         """Show what is asked; replace the buttons only where others are due: somebody may be about to press one."""
@@ -89,9 +95,10 @@ class QuestionBar:
     def _add_result(self) -> None:
         view = self.tab.view
         assert view.result
-        address = f"/policies/{view.run}/{view.result.id}.npz"
-        save = ui.button("Save the policy file", on_click=lambda: ui.download(address))
-        save.props("no-caps dense color=primary")
+        ui.button("Save the policy file", on_click=self._save).props("no-caps dense color=primary")
+        with ui.dropdown_button("Save more", auto_close=True).props("no-caps dense outline"):
+            for what, address in texts.MORE_FILES.items():
+                ui.item(what, on_click=lambda address=address: ui.download(address.format(run=view.run)))
         ui.button("How it came about", on_click=lambda: self.tab.turn_to(texts.HISTORY)).props("no-caps dense outline")
         ui.button("Train on for", on_click=self._train_on).props("no-caps dense outline").tooltip(texts.TRAIN_ON_HINT)
         number = ui.number(value=self.rounds, min=1, max=1000, format="%d", on_change=self._set_rounds)
@@ -101,6 +108,16 @@ class QuestionBar:
     async def _take_back(self) -> None:
         view = self.tab.view
         await self.tab.step_back(view.run, view.choices[-1][0])
+
+    def _save(self) -> None:
+        """Save the file of the result, and say how to use it."""
+        view = self.tab.view
+        assert view.result
+        ui.download(f"/policies/{view.run}/{view.result.id}.npz")
+        self.lines.clear()
+        with self.lines:
+            ui.label(how_to(view.config.env, f"policy-{view.result.id}.npz"))
+        self.how_to.open()
 
     def _go_on_for(self, event: ValueChangeEventArguments[float | None]) -> None:
         self.tab.go_on_for(int(event.value or 1))

@@ -1,0 +1,85 @@
+"""The journey of a run as one page that needs no network: its result, how to use it, every question, the plots."""
+
+import base64
+import io
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import envs
+from jmorl.display.console import PlainConsole
+from jmorl.display.text import confirmed_in_words, number_format, plural, values_in_words
+from jmorl.report.tables import run_tables
+from jmorl.search.policy import values_of
+from jmorl.storage.files import written_whole
+from jmorl.storage.layout import Layout
+from jmorl.storage.stored_run import StoredRun
+
+WIDTH = 110  # characters of the tables
+STYLE = """
+:root { color-scheme: light dark; }
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+img { max-width: 100%; background: white; border-radius: 6px; margin: 0.5rem 0; }
+pre { overflow-x: auto; font-size: 12.5px; line-height: 1.35; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
+"""
+HOW_TO = """\
+import jmorl
+policy = jmorl.load_policy("{file}")
+action = policy(observation)  # NumPy alone: [{observation}] numbers to [{action}]"""
+
+
+def how_to(env: str, file: str) -> str:
+    """Return the lines of Python that use a policy file made in an environment."""
+    environment = envs.make(env)
+    return HOW_TO.format(file=file, observation=environment.observation_size, action=environment.action_size)
+
+
+def write_journey(run: StoredRun, plots: Sequence[Path], path: Path) -> None:
+    """Write the page of a run, with its plots, which are PNG files. Raises OSError."""
+    page = journey_page(run, plots)
+    with written_whole(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def journey_page(run: StoredRun, plots: Sequence[Path]) -> str:
+    """Return an HTML page about a run, with its plots. Raises OSError for a plot that cannot be read."""
+    title = f"{run.path.name}: {run.config.env}"
+    asked = sum(not getattr(record, "stand_in", False) for record in run.decisions)
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        f"<p>{escape(_result(run))} It took {plural(len(run.metrics['generation']) - 1, 'round')} of training and "
+        f"{plural(asked, 'answer')}.</p>",
+    ]
+    if run.chosen:
+        lines = how_to(run.config.env, Layout(run.path).chosen.name)
+        parts += ["<h2>How to use the policy</h2>", f"<pre>{escape(lines)}</pre>"]
+    parts += ["<h2>Pictures</h2>", *(_picture(plot) for plot in plots)] if plots else []
+    parts += ["<h2>The run in numbers</h2>", f"<pre>{escape(_tables(run))}</pre>"]
+    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}</style>'
+    viewport = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+    body = "\n".join(parts)
+    return f'<!doctype html>\n<html lang="en"><head>{head}{viewport}</head>\n<body>\n{body}\n</body></html>\n'
+
+
+def _result(run: StoredRun) -> str:
+    """Say what came of a run."""
+    if run.chosen is None:
+        return "The run has not ended."
+    formats = [number_format(column) for column in values_of(run.front).T]
+    plain = values_in_words(run.chosen.values, run.objectives, formats)
+    return f"The result is policy {run.chosen.id}: {confirmed_in_words(run.chosen, run.objectives) or plain}."
+
+
+def _picture(plot: Path) -> str:
+    data = base64.b64encode(plot.read_bytes()).decode("ascii")
+    return f'<img alt="{escape(plot.stem.replace("_", " "), quote=True)}" src="data:image/png;base64,{data}">'
+
+
+def _tables(run: StoredRun) -> str:
+    """Return what `jmorl show` prints."""
+    text = io.StringIO()
+    console = PlainConsole(file=text, width=WIDTH)
+    for table in run_tables(run):
+        console.print(table)
+    return "\n".join(line.rstrip() for line in text.getvalue().splitlines())
