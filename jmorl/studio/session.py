@@ -15,11 +15,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import envs
-from jmorl.decision.answers import Answer, PointAnswer
+from jmorl.decision.answers import Answer, AnswerError, PointAnswer
 from jmorl.decision.protocol import Question
 from jmorl.events import RunFinished
+from jmorl.learning.population import TrainingFault
 from jmorl.loop import make_method
-from jmorl.methods.base import Prospect
+from jmorl.methods.base import MethodError, Prospect
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
 from jmorl.state import RunState
@@ -34,6 +35,8 @@ from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.history import Branch, free_folder, read_tree
 from jmorl.studio.person import LeftOff, Person
 from jmorl.studio.view import PERSON, View, after, stored_view
+
+LASTING = (TrainingFault, AnswerError, MethodError)  # what breaks a run off again where it is taken up
 
 
 class Session:
@@ -241,7 +244,8 @@ class Session:
             pass
         except Exception as error:  # whatever it is, the page says it, and what the run had is kept
             traceback.print_exc()
-            self.view = replace(self.view, problem=f"{type(error).__name__}: {error}")
+            for_good = isinstance(error, LASTING)
+            self.view = replace(self.view, problem=str(error) or type(error).__name__, for_good=for_good)
         finally:
             self.view = replace(self.view, timeline=None, question=None)
 

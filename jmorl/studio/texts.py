@@ -32,6 +32,9 @@ MORE_FILES = {
     "The front as a picture (PNG)": "/pictures/{run}.png",
     "The journey as a page (HTML)": "/journeys/{run}.html",
 }
+KEPT = "What the run had is kept."
+PUT_RIGHT = "Go on when that is put right."
+GOING_ON_FAILS = "Going on would fail in the same way: step back in the history, and choose otherwise."
 HOW_TO = "The policy file is saved. Put it beside your program, and use it with NumPy alone:"
 PAUSE_HINT = "The run stops when this round is over, and can go on from there at any time."
 TRAIN_ON_HINT = "A new branch goes on where this run ended. This run and its result stay as they are."
@@ -59,7 +62,7 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
     """Say what is going on."""
     timeline = view.timeline
     if view.problem:
-        return f"Stopped: {view.problem}"
+        return "Stopped"
     if view.result:
         return f"Finished: {view.reason}"
     if timeline is None:
@@ -119,6 +122,9 @@ def heading(view: View, selection: Selection) -> str:
         return f"{asked} {LAST_ROUND}" if last else asked
     if view.result:
         return f"The result is policy {view.result.id}: {scores(view, view.result)}"
+    if view.problem:
+        then = GOING_ON_FAILS if view.for_good else PUT_RIGHT
+        return f"Training has stopped: {view.problem.rstrip('.')}. {KEPT} {then}"
     if view.timeline is None:
         return "Look around, step back in the history, or go on with this run."
     if not view.generations:

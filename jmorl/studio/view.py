@@ -59,6 +59,7 @@ class View:
     result: Policy | None = None
     reason: str = ""  # why the run ended, in words
     problem: str = ""  # what broke the run off, a sentence
+    for_good: bool = False  # going on would break the run off in the same way
     asking: Asking | None = None  # somebody wants the next question before the next generation, or the end
     stand_in: str = ""  # why the last choice was made by a stand-in; nothing if it was the person's own
     answered: int | None = None  # generation of the last question that the person answered themselves

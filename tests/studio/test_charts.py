@@ -281,11 +281,19 @@ def test_between_questions_the_heading_says_who_is_asked_and_when(view, silent, 
     [
         ({}, "Waiting for your answer"),
         ({"question": None, "timeline": None}, "Paused after round 1"),
-        ({"problem": "OSError: full"}, "Stopped: OSError: full"),
+        ({"problem": "the disk is full"}, "Stopped"),
     ],
 )
 def test_the_phase_says_what_is_waited_for(view, changes, text):
     assert texts.phase(replace(view, **changes), now=5.0) == text
+
+
+def test_a_failure_is_said_once_with_what_to_do(view):
+    failed = replace(view, question=None, timeline=None, problem="the disk is full.")
+    told = "Training has stopped: the disk is full. What the run had is kept."
+    assert texts.heading(failed, Selection()) == f"{told} Go on when that is put right."
+    again = texts.heading(replace(failed, for_good=True), Selection())
+    assert again == f"{told} Going on would fail in the same way: step back in the history, and choose otherwise."
 
 
 def test_a_minus_is_a_minus_only_before_a_number():

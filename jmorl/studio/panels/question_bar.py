@@ -49,9 +49,9 @@ class QuestionBar:
                 self._add_answers()
             elif view.result:
                 self._add_result()
-            elif view.timeline is None:
+            elif view.timeline is None and not view.for_good:
                 ui.button("Go on with this run", on_click=self._go_on).props("no-caps dense color=primary")
-            elif view.generations:
+            elif view.timeline and view.generations:
                 self._add_interruptions()
 
     def _add_more(self) -> None:
