@@ -1,6 +1,7 @@
 """The texts of the page."""
 
 import re
+from functools import lru_cache
 
 import numpy as np
 
@@ -144,7 +145,8 @@ def heading(view: View, selection: Selection) -> str:
 
 def introduction(view: View) -> str:
     """Say to somebody new what happens here."""
-    return INTRODUCTION.format(objectives=" and ".join(objective.label for objective in view.objectives))
+    *others, last = (objective.label for objective in view.objectives)
+    return INTRODUCTION.format(objectives=f"{', '.join(others)} and {last}")
 
 
 def ranges(view: View) -> list[str]:
@@ -234,6 +236,7 @@ def raw_returns(view: View, policy: Policy) -> str:
     return "raw returns: " + minus(values_in_words(policy.raw, view.objectives, formats))
 
 
+@lru_cache(maxsize=4)
 def formats_of(view: View) -> list[str]:
     """Return the number format of each objective, fit for the front; for zeros where there is no front."""
     values = view.values if view.front else np.zeros((1, len(view.objectives)))

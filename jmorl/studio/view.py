@@ -4,6 +4,7 @@ The thread of the run makes it, the page reads it; neither waits for the other.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -65,7 +66,7 @@ class View:
     answered: int | None = None  # generation of the last question that the person answered themselves
     notes: tuple[str, ...] = ()  # what somebody should know about it, sentences
 
-    @property
+    @cached_property
     def values(self) -> np.ndarray:  # [N, M]
         """Return the front's objective vectors; N may be zero."""
         return values_of(self.front) if self.front else np.zeros((0, len(self.objectives)))

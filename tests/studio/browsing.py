@@ -66,6 +66,24 @@ class Tab:
         """Return the first objective of a row."""
         return float(self.rows().nth(row).locator("span").nth(2).inner_text().split()[0].replace("−", "-"))
 
+    def drift(self):
+        """Return how many pixels the chart of marks puts a point beside the place that the chart below gives it."""
+        return self.page.evaluate(
+            """() => {
+              const [below, marks] = [...document.querySelectorAll(".front .nicegui-echart")].map(
+                (each) => getElement(each.id.slice(1)).chart);
+              const point = below.getOption().series.find((each) => each.id === "within the bounds").data[0];
+              const [a, b] = [below, marks].map((chart) =>
+                chart.convertToPixel({ xAxisIndex: 0, yAxisIndex: 0 }, [point[1], point[2]]));
+              const [p, q] = [below, marks].map((chart) => chart.getDom().getBoundingClientRect());
+              return Math.hypot(a[0] + p.x - b[0] - q.x, a[1] + p.y - b[1] - q.y);
+            }"""
+        )
+
+    def better_in(self, objective):
+        """Return the button that shows only what is better in an objective."""
+        return self.page.locator(".question").get_by_role("button", name=objective, exact=True)
+
     def put_all_away(self):
         """Put away what is laid out."""
         away = self.page.get_by_role("button", name=re.compile("put policy .* away"))

@@ -46,9 +46,8 @@ def view():
     )
 
 
-def series(drawn):
-    """Return the series of options, or of marks, by their names."""
-    return {each["name"]: each for each in (drawn["series"] if isinstance(drawn, dict) else drawn)}
+def series(options):
+    return {each["name"]: each for each in options["series"]}
 
 
 def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(view):
@@ -106,19 +105,24 @@ def test_nothing_in_a_chart_is_html_and_all_of_it_is_json(view):
             json.dumps(options, allow_nan=False)
         selection = Selection().with_policy(9)
         for marks in (front_marks(shown, selection, (0, 1), asked), parallel_marks(shown, selection)):
-            assert all(each["silent"] and "tooltip" not in each for each in marks)
+            assert all(each["silent"] and "tooltip" not in each for each in marks["series"])
             json.dumps(marks, allow_nan=False)
 
 
-def test_marks_have_ids_of_their_own(view):
-    """They are sent without the rest of the chart, which they must not replace."""
-    selection = Selection().with_policy(9)
-    for options, marks in (
-        (front_options(view, (1, 0), None), front_marks(view, selection, (1, 0), None)),
-        (parallel_options(view), parallel_marks(view, selection)),
-    ):
-        ids = [each["id"] for each in (*options["series"], *marks)]
-        assert len(set(ids)) == len(ids)
+def test_marks_lie_exactly_over_the_chart(view):
+    """Whatever the labels are, which the marks' chart has not: it has the same room for them."""
+    long = replace(view, front=(*view.front, policy(8, (-1234567.0, -1e7))))
+    for shown_view in (view, long):
+        selection = Selection().with_policy(9)
+        chart, marks = front_options(shown_view, (1, 0), None), front_marks(shown_view, selection, (1, 0), None)
+        for axis in ("xAxis", "yAxis"):
+            assert [chart[axis][end] for end in ("min", "max")] == [marks[axis][end] for end in ("min", "max")]
+            assert chart[axis]["show"] and not marks[axis]["show"]
+        assert chart["grid"] == marks["grid"] and chart["grid"]["outerBoundsMode"] == "none"
+    lines, marked = parallel_options(view), parallel_marks(view, Selection().with_policy(9))
+    for shown, hidden in zip(lines["parallelAxis"], marked["parallelAxis"], strict=True):
+        assert (shown["min"], shown["max"]) == (hidden["min"], hidden["max"]) and not hidden["name"]
+    assert all(lines["parallel"][side] == marked["parallel"][side] for side in ("left", "right", "top", "bottom"))
 
 
 def test_charts_have_the_same_series_whatever_there_is_to_see(view):

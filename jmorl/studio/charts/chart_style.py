@@ -38,7 +38,7 @@ def base() -> dict[str, Any]:
 
 def better(objective: Objective) -> str:
     """Return the title of an axis: quantity, unit and direction."""
-    return f"{objective_label(objective)}, more is better →"
+    return f"{objective_label(objective)}, better →"
 
 
 def decimals(values: np.ndarray) -> list[int | None]:

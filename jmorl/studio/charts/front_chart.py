@@ -35,6 +35,7 @@ GHOSTS = 6  # earlier fronts
 IN_FORCE = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
 PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
 RULED_OUT = {"color": INK, "opacity": 0.12}
+LONGEST_NAME, DIGIT = 260, 7  # pixels
 MANY = 300  # policies; more are drawn smaller
 
 
@@ -42,7 +43,7 @@ def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None
     """Draw what stays while policies are looked at; `axes` are the objectives to the right and upwards."""
     limits = _limits(view, asked)
     return {
-        **_frame(view, axes, limits),
+        **_frame(view, axes, limits, visible=True),
         "series": [
             _area("bounds", view.bounds, axes, limits, IN_FORCE),
             _ghosts(view, axes),
@@ -55,30 +56,34 @@ def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None
     }
 
 
-def front_marks(
-    view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None
-) -> list[dict[str, Any]]:
-    """Draw what follows from the selection: series over the others, so that little is sent anew."""
+def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: PointQuestion | None) -> dict[str, Any]:
+    """Draw what follows from the selection: a chart to put over the other, so that little is drawn anew."""
     limits = _limits(view, asked)
     prospect = selection.prospect if view.question else None  # what is answered brings nothing any more
     bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
-    return [
-        _ruled_out(selection, axes, limits),
-        _area("bounds that would follow", bounds, axes, limits, PROPOSED),
-        _expected(prospect, axes),
-        _wanted(view, selection, axes, limits),
-        _laid_out(view, selection, axes, limits),
-        _points(asked, axes),
-    ]
+    return {
+        **_frame(view, axes, limits, visible=False),
+        "series": [
+            _ruled_out(selection, axes, limits),
+            _area("bounds that would follow", bounds, axes, limits, PROPOSED),
+            _expected(prospect, axes),
+            _wanted(view, selection, axes, limits),
+            _laid_out(view, selection, axes, limits),
+            _points(asked, axes),
+        ],
+    }
 
 
-def _frame(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
-    """Return the options of the axes."""
-    visible = bool(view.front)
+def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
+    """Return the options that give both charts the same coordinates: no label may move or shrink their grids."""
+    visible = visible and bool(view.front)
+    digits = max(len(f"{value:,.4g}") for value in limits[:, axes[1]])
+    room = max(36, DIGIT * digits)  # for the numbers at the left
     x, y = (
-        _axis(view.objectives[axis], limits[:, axis], gap, visible) for axis, gap in zip(axes, (26, 46), strict=True)
+        _axis(view.objectives[axis], limits[:, axis], gap, visible)
+        for axis, gap in zip(axes, (26, room + 10), strict=True)
     )
-    grid = {"left": 62, "right": 18, "top": 14, "bottom": 44}
+    grid = {"left": room + 26, "right": 18, "top": 14, "bottom": 44, "containLabel": False, "outerBoundsMode": "none"}
     return {**base(), "grid": grid, "xAxis": x, "yAxis": y}
 
 
@@ -109,7 +114,13 @@ def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> 
         "nameTextStyle": TEXT,
         "min": low,
         "max": high,
-        "axisLabel": {**TEXT, "showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
+        "nameTruncate": {"maxWidth": LONGEST_NAME},
+        "axisLabel": {
+            **TEXT,
+            "showMinLabel": False,
+            "showMaxLabel": False,
+            "hideOverlap": True,
+        },
         "axisLine": {"onZero": False, "lineStyle": {"color": GREY}},
         "splitLine": {"lineStyle": {"color": "#ececec"}},
         "splitNumber": 5,
@@ -154,7 +165,8 @@ def _members(view: View, axes: tuple[int, int], limits: np.ndarray, within_bound
 def _far_out(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str, Any]:
     """Draw the members of the front beyond the chart at its edge, as arrows, with the values that are far out."""
     data = []
-    for policy in (policy for policy in view.front if not _in_chart(policy.values[None], axes, limits)[0]):
+    outside = ~_in_chart(view.values, axes, limits)
+    for policy in (view.front[row] for row in np.flatnonzero(outside)):
         beyond = [int(np.sign(policy.values[axis] - np.clip(policy.values[axis], *limits[:, axis]))) for axis in axes]
         told = [
             f"{view.objectives[axis].label} {number(float(policy.values[axis]))}".replace("-", "−")

@@ -28,7 +28,7 @@ def parallel_options(view: View) -> dict[str, Any]:
     """Draw what stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
     inside = within(view.values, view.bounds)
     return {
-        **_frame(view),
+        **_frame(view, visible=True),
         "series": [
             _lines("outside the bounds", view, ~inside, PALE),
             _lines("within the bounds", view, inside, BLUE),
@@ -37,8 +37,8 @@ def parallel_options(view: View) -> dict[str, Any]:
     }
 
 
-def parallel_marks(view: View, selection: Selection) -> list[dict[str, Any]]:
-    """Draw the lines of the policies laid out, over the others."""
+def parallel_marks(view: View, selection: Selection) -> dict[str, Any]:
+    """Draw the lines of the policies laid out: a chart to put over the other."""
     lines = [
         {
             "value": [*plain(policy.values)[0], policy.id],
@@ -55,16 +55,17 @@ def parallel_marks(view: View, selection: Selection) -> list[dict[str, Any]]:
     lowest = _axes_limits(view)[0]
     proposed = plain(np.maximum(prospect.bounds, lowest)) if prospect and np.isfinite(prospect.bounds).all() else []
     dashed = {"color": GREEN, "width": 1.5, "type": "dashed", "opacity": 1}
-    return [
+    series = [
         _series("bounds that would follow", proposed, lineStyle=dashed, silent=True, z=4),
         _series("laid out", lines, silent=True, z=5),
     ]
+    return {**_frame(view, visible=False), "series": series}
 
 
-def _frame(view: View) -> dict[str, Any]:
-    """Return the options of the axes."""
+def _frame(view: View, visible: bool) -> dict[str, Any]:
+    """Return the options that give both charts the same coordinates."""
     limits = _axes_limits(view)
-    visible = bool(view.front)
+    visible = visible and bool(view.front)
     text = {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False}
     axes = [
         {

@@ -5,7 +5,7 @@ from nicegui.events import EChartPointClickEventArguments
 
 from jmorl.studio import texts
 from jmorl.studio.charts.front_chart import front_marks, front_options
-from jmorl.studio.panels.drawing import clicked, draw, mark
+from jmorl.studio.panels.drawing import clicked, draw
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -29,23 +29,20 @@ class FrontPanel:
         with ui.element("section").classes("panel front").props('aria-label="The front"'):
             if len(tab.view.objectives) > 2:
                 self._add_pickers()
-            self.chart = ui.echart({}, on_point_click=self._look_at).classes("chart")
+            with ui.element("div").classes("chart"):
+                self.points = ui.echart({}, on_point_click=self._look_at)
+                self.marks = ui.echart({}).classes("overlay")
             self.outlook = ui.label().classes("outlook").props('aria-live="polite"')
             _add_legend()
 
     def show(self) -> None:
-        """Draw all after a new view; draw only the marks, which are few, when the selection alone changes."""
+        """Draw the front after a new view; draw the marks over it, which are few, whenever the selection changes."""
         tab = self.tab
-        all_new = self.drawn.is_new(tab.view, tab.axes, tab.dialogue)
-        if not self.marked.is_new(tab.selection) and not all_new:
-            return
-        self.outlook.set_text(texts.outlook(tab.view, tab.selection))
-        marks = front_marks(tab.view, tab.selection, tab.axes, tab.point_question)
-        if all_new:
-            options = front_options(tab.view, tab.axes, tab.point_question)
-            draw(self.chart, {**options, "series": [*options["series"], *marks]})
-        else:
-            mark(self.chart, marks)
+        if self.drawn.is_new(tab.view, tab.axes, tab.dialogue):
+            draw(self.points, front_options(tab.view, tab.axes, tab.point_question))
+        if self.marked.is_new(tab.view, tab.axes, tab.dialogue, tab.selection):
+            draw(self.marks, front_marks(tab.view, tab.selection, tab.axes, tab.point_question))
+            self.outlook.set_text(texts.outlook(tab.view, tab.selection))
 
     def _add_pickers(self) -> None:
         names = {index: objective.label for index, objective in enumerate(self.tab.view.objectives)}

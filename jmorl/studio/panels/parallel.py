@@ -4,7 +4,7 @@ from nicegui import ui
 from nicegui.events import EChartPointClickEventArguments
 
 from jmorl.studio.charts.parallel_chart import parallel_marks, parallel_options
-from jmorl.studio.panels.drawing import clicked, draw, mark
+from jmorl.studio.panels.drawing import clicked, draw
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -16,20 +16,16 @@ class ParallelPanel:
         self.tab = tab
         self.drawn, self.marked = Shown(), Shown()
         with ui.element("section").classes("panel lines").props('aria-label="Parallel coordinates"'):
-            self.chart = ui.echart({}, on_point_click=self._look_at)
+            self.lines = ui.echart({}, on_point_click=self._look_at)
+            self.marks = ui.echart({}).classes("overlay")
 
     def show(self) -> None:
-        """Draw all lines after a new view; draw only those laid out when the selection alone changes."""
+        """Draw the lines after a new view; draw the marks over them whenever the selection changes."""
         view, selection = self.tab.view, self.tab.selection
-        all_new = self.drawn.is_new(view)
-        if not self.marked.is_new(selection) and not all_new:
-            return
-        marks = parallel_marks(view, selection)
-        if all_new:
-            options = parallel_options(view)
-            draw(self.chart, {**options, "series": [*options["series"], *marks]})
-        else:
-            mark(self.chart, marks)
+        if self.drawn.is_new(view):
+            draw(self.lines, parallel_options(view))
+        if self.marked.is_new(view, selection):
+            draw(self.marks, parallel_marks(view, selection))
 
     def _look_at(self, event: EChartPointClickEventArguments) -> None:
         self.tab.look_at(int(clicked(event)[-1]))
