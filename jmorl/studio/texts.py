@@ -122,7 +122,8 @@ def heading(view: View, selection: Selection) -> str:
         last = view.timeline is not None and view.timeline.left == 1 and purpose == "steer"
         return f"{asked} {LAST_ROUND}" if last else asked
     if view.result:
-        return f"The result is policy {view.result.id}: {scores(view, view.result)}"
+        values = minus(values_in_words(view.result.values, view.objectives, formats_of(view)))
+        return f"The result is policy {view.result.id}: {values}"
     if view.problem:
         then = GOING_ON_FAILS if view.for_good else PUT_RIGHT
         return f"Training has stopped: {view.problem.rstrip('.')}. {KEPT} {then}"

@@ -33,7 +33,7 @@ class Cards:
         for letter, place in self.places.items():
             policy = view.policy(selection.places[letter]) if letter in selection.places else None
             card = self.cards.get(letter)
-            if card and (policy is None or (view.run, policy.id) != (card.run, card.policy.id)):
+            if card and (view.run != card.run or policy is not card.policy):  # it may have been scored anew
                 place.clear()
                 del self.cards[letter]
             if policy and letter not in self.cards:
