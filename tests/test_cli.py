@@ -224,8 +224,8 @@ def test_all_bad_input_is_named_at_once_and_nothing_is_made(tmp_path, capsys):
         (["train", "--user", "target=1,2,3"], "user: target must have one number for each of 2 objectives"),
         (["train", "--user", "script=/nowhere"], "user: there is no decision log"),
         (["train", "--config", "/nowhere.toml"], "config: cannot read /nowhere.toml"),
-        (["show", "/nowhere"], "/nowhere is not a run folder"),
-        (["enautilus", "/nowhere"], "/nowhere is not a run folder"),
+        (["show", "/nowhere"], "/nowhere does not exist"),
+        (["enautilus", "/nowhere"], "/nowhere does not exist"),
         (["evaluate", "/nowhere.npz"], "/nowhere.npz is not a policy file"),
     ],
 )
