@@ -154,13 +154,14 @@ def branch(
 ) -> Continued:
     """Make a new run, in the folder `out`, that begins where a run was after a generation.
 
-    It has the earlier run's logs up to there and decides for itself from then on, at once; `user` says who, if not as
-    before, and `steps` how many environment steps it may use, those before it included. Raises CannotContinue,
-    FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or has a script that cannot be read,
-    ConfigError; nothing is made then.
+    It has the earlier run's logs up to there and decides for itself from then on, at once. `user` says who, if not as
+    before: what somebody else has said then counts no more. `steps` says how many environment steps it may use, those
+    before it included. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or
+    has a script that cannot be read, ConfigError; nothing is made then.
     """
     path, out = Path(path), Path(out)
     manifest, config = read_start(path)
+    user = None if user == config.user else user
     config = config.replace(**{"user": user or config.user, "steps": steps or config.steps})
     environment = _environment(config)
     _refuse_to_rescale(path, manifest, environment)

@@ -51,7 +51,7 @@ class Session:
         self.clock = clock
         self.prospects: Mapping[int, Prospect] = {}  # policy -> what choosing it now would mean, as far as known
         self.dialogue: Dialogue | None = None
-        self._worked_out: set[int] = set()  # policies whose prospects are known, or to come
+        self._worked_out: set[tuple[int, int]] = set()  # question and policy of prospects that are known, or to come
         self.leaving = False  # the run is about to be left, after its generation
         self._moving = threading.Lock()  # while one run is left for another
         self._person: Person | None = None
@@ -102,8 +102,8 @@ class Session:
     def work_out(self, policy: int) -> None:
         """Find out in the background what choosing the policy would mean; `prospects` has it then."""
         question, state = self.view.question, self.view.state
-        if question and question.purpose != "final" and state and policy not in self._worked_out:
-            self._worked_out.add(policy)
+        if question and question.purpose != "final" and state and (id(question), policy) not in self._worked_out:
+            self._worked_out.add((id(question), policy))
             self._background.submit(self._note_prospect, question, state, policy)
 
     def history(self) -> tuple[Branch, ...]:

@@ -59,6 +59,7 @@ class Tab:
         self.covered = False  # by a dialog, which takes all keys
         self.generations = 1  # to go on for after the answer, before the next question
         self._settled: Question | None = None  # a question that whoever sits here knows to be answered
+        self._limited = False  # limits were set here since the last answer
         self.show, self.tell = show, tell
         place, selection = self.kept.get("selection", (None, None))
         if place == self._place:
@@ -96,6 +97,7 @@ class Tab:
         self.view, self.dialogue = view, dialogue
         if view.question is not before.question:
             self.generations, self.ending = 1, None
+        self._limited = self._limited and view.run == before.run
         if view.run != before.run or (view.question and view.question is not before.question):
             self._begin()
         elif view is not before:
@@ -132,6 +134,7 @@ class Tab:
         """Set what an objective must reach, from the next answer on for the search, too; None: anything."""
         limits = list(self.selection.limits or [-math.inf] * len(self.view.objectives))
         limits[objective] = -math.inf if least is None else least
+        self._limited = True
         self._lay_out(replace(self.selection, limits=tuple(limits)))
         self.show()
 
@@ -188,7 +191,7 @@ class Tab:
         """Answer a question that this tab has shown, with the limits set in it; a second click does nothing more."""
         if question is self._settled:
             return
-        self._settled = question
+        self._settled, self._limited = question, False
         if self.selection.limits != question.limits:
             answer = replace(answer, limits=self.selection.limits)
         if not self.session.answer(question, answer):
@@ -276,7 +279,8 @@ class Tab:
     def _begin(self) -> None:
         """Lay out what the open question is best begun with, or the result."""
         if self.view.question:
-            self._lay_out(to_begin_with(self.view, self.axes))
+            selection = to_begin_with(self.view, self.axes)
+            self._lay_out(replace(selection, limits=self.selection.limits) if self._limited else selection)
         elif self.view.result:
             self._lay_out(Selection().with_policy(self.view.result.id))
         else:

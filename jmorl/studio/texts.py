@@ -186,10 +186,12 @@ def end_with(view: View, selection: Selection, policy: Policy) -> str:
 
 
 def standing(view: View, policy: Policy) -> str:
-    """Say what a policy is to the person: their last choice, what has replaced it, or new; nothing for any other."""
+    """Say what a policy is to the person: the last choice, what has replaced it, or new; nothing for any other."""
     last = last_choice(view)
     if last and policy.id == last.id:
-        return "your last choice" if view.previous and view.previous.id == last.id else "has replaced your last choice"
+        chosen = "chosen for you" if view.stand_in else "your last choice"
+        replaced = "has replaced what was chosen for you" if view.stand_in else "has replaced your last choice"
+        return chosen if view.previous and view.previous.id == last.id else replaced
     return "new" if view.is_new(policy) else ""
 
 

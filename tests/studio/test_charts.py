@@ -290,6 +290,21 @@ def test_the_phase_says_what_is_waited_for(view, changes, text):
     assert texts.phase(replace(view, **changes), now=5.0) == text
 
 
+def test_a_card_says_what_its_policy_is_to_the_person(view):
+    chosen, better = view.front[0], policy(6, (-75.0, -15.0))
+    newer = replace(view, answered=1)
+    assert [texts.standing(newer, each) for each in view.front] == ["your last choice", "new", "new", "new"]
+    assert texts.standing(replace(view, stand_in="it is clear"), chosen) == "chosen for you"
+    replaced = replace(view, front=(*view.front[1:], better))
+    assert texts.standing(replaced, better) == "has replaced your last choice"
+    assert texts.keep(replace(replaced, question=replace(view.question, front=replaced.front))).startswith(
+        "Take policy 6"
+    )
+    selection = Selection().with_policy(4).with_policy(9)
+    assert texts.beside(view, selection, view.front[1]) == "Beside A: time 10.0 better, <b>fuel</b> 20.0 worse"
+    assert texts.beside(view, selection, chosen) == ""
+
+
 def test_a_failure_is_said_once_with_what_to_do(view):
     failed = replace(view, question=None, timeline=None, problem="the disk is full.")
     told = "Training has stopped: the disk is full. What the run had is kept."

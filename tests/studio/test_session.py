@@ -112,6 +112,7 @@ def test_stepping_back_begins_a_branch_and_the_run_left_behind_can_be_taken_up(s
     path, run = session.view.path, session.view.run
     session.step_back(run, 1)
     again = session.question()
+    assert "another_user" not in json.loads((session.view.path / "manifest.json").read_text())["parent"]
     assert again.generation == 1 and session.view.path == path.with_name("run-2")
     assert session.view.previous is None and not session.view.choices
     session.answer(again, Answer(best(again, 2)))

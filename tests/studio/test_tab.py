@@ -202,6 +202,10 @@ def test_limits_leave_out_what_does_not_reach_them_and_go_with_the_answer(sessio
     assert session.question().limits == (least, -np.inf, -np.inf)
     tab.follow()
     assert tab.selection.limits == (least, -np.inf, -np.inf)
+    tab.view = replace(tab.view, question=None)  # as it is while a generation is trained
+    tab.limit(0, -99.0)
+    tab.follow()
+    assert tab.view.question and tab.selection.limits == (-99.0, -np.inf, -np.inf)
     tab.limit(0, None)
     assert listed(tab.view, tab.selection) is None
     tab.choose(tab.selection.focus)

@@ -21,8 +21,8 @@ class QuestionBar:
         with ui.element("section").classes("bar question").props('aria-label="The question"'):
             self.heading = ui.label().classes("heading").props('role="status" aria-live="polite"')
             self.buttons = ui.element("div").classes("buttons")
-        how_to = ui.dialog().props('aria-label="How to use the policy"')
-        with how_to.bind_value_to(tab, "covered") as self.how_to, ui.card():
+        dialog = ui.dialog().props('aria-label="How to use the policy"')
+        with dialog.bind_value_to(tab, "covered") as self.how_to, ui.card():
             ui.label(texts.HOW_TO)
             self.lines = ui.element("pre").classes("lines-of-python")
             ui.button("Close", on_click=self.how_to.close).props("flat no-caps")
