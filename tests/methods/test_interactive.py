@@ -209,8 +209,9 @@ def test_the_last_question_of_a_run_keeps_to_the_limits(limited):
     state = generations(limited)[-1].state
     archived = {policy.id: policy.values for policy in state.archive.members}
     question: Any = limited[-2].question
-    values = np.stack([archived[policy.id] for policy in question.whole.front])
+    values = np.stack([archived[policy.id] for policy in question.front])
     assert within(values, np.array(question.limits)).all()
+    assert {policy.id for policy in question.whole.front} == archived.keys()  # whoever asks for the others sees them
 
 
 def test_new_limits_take_the_place_of_all_that_were_set_and_none_leaves_them(config, limited):
