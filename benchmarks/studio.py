@@ -156,7 +156,7 @@ def question(folder: Path) -> list[float]:
     """Seconds between a choice and the next question that were not the generation's own."""
     waited = []
     run = str(folder / "question")
-    with served("jmorl.cli", "studio", "--out", run, "--port", str(PORT)), browser_page() as page:
+    with served("jmorl.cli", "studio", "--out", run, "--port", str(PORT), "--ask", "always"), browser_page() as page:
         page.get_by_text("Round 1: which of these").wait_for(timeout=300_000)
         for generation in range(2, 7):
             page.locator(".policies-row").first.click()

@@ -68,8 +68,10 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
     @ui.page("/")
     async def page() -> None:
         ui.add_head_html(f"{ENGLISH}{REMEMBERED}")
-        await ui.context.client.connected()  # before that the browser's tab is not known
-        Page(session, app.storage.tab)
+        client = ui.context.client
+        await client.connected()  # before that the browser's tab is not known
+        if client.has_socket_connection:  # and after that it may be closed again
+            Page(session, app.storage.tab)
 
     serving = threading.Thread(target=_run, args=(host, port), name="server", daemon=True)
     serving.start()
