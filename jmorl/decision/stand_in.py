@@ -77,7 +77,7 @@ class StandIn(Wrapper):
         verdict = model.verdict()
         asked = self._shortened(question, model, verdict)
         if self._is_sure(question, verdict) and not self.ask_now and not self.user.remembers(asked):
-            reason = f"your earlier answers speak for it, and expect a loss of {verdict.regret:.1%} of the range"
+            reason = f"your earlier answers speak for it; the loss to expect is {verdict.regret:.1%} of the range"
             self.chose_last = True
             return question, Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
         self.ask_now = False

@@ -26,7 +26,7 @@ h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 HOW_TO = """\
 import jmorl
 policy = jmorl.load_policy("{file}")
-action = policy(observation)  # NumPy alone: [{observation}] numbers to [{action}]"""
+action = policy(observation)  # [{observation}] numbers to [{action}]"""
 
 
 def how_to(env: str, file: str) -> str:

@@ -27,6 +27,7 @@ from jmorl.storage.stored_run import StoredRun, read_run
 from jmorl.units import measured_in
 
 PERSON = "terminal"  # the config's user whose questions are put on the page
+UNRECORDED = "your earlier answers speak for it"  # why a stand-in answered, as far as a log tells
 Asking = Literal["question", "end"]
 
 
@@ -119,6 +120,7 @@ def stored_view(path: Path) -> View:
         previous=stored.policies[decisions[-1].policy] if decisions else None,
         choices=tuple((record.generation, np.array(record.values)) for record in decisions),
         answered=max((record.generation for record in decisions if not record.stand_in), default=None),
+        stand_in=UNRECORDED if decisions and decisions[-1].stand_in else "",
         result=stored.chosen,
         reason=REASONS[stored.result["reason"]] if stored.result else "",
     )
@@ -151,7 +153,7 @@ def after(view: View, event: Event, now: float) -> View:
 
 def _reason(event: Decided) -> str:
     """Return why a stand-in answered."""
-    return str(getattr(event.answer, "reason", "")) or "your earlier answers speak for it"
+    return str(getattr(event.answer, "reason", "")) or UNRECORDED
 
 
 def _generations(stored: StoredRun) -> tuple[Generation, ...]:

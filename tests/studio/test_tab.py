@@ -14,6 +14,7 @@ from jmorl.storage.run_folder import RunFolder
 from jmorl.studio import texts
 from jmorl.studio.selection import last_choice, listed
 from jmorl.studio.tab import Tab
+from jmorl.studio.view import stored_view
 
 
 class Watching:
@@ -245,6 +246,7 @@ def test_one_is_told_what_a_stand_in_has_chosen_and_how_many_questions_there_may
     lines = (session.view.path / "decisions.jsonl").read_text().splitlines()
     stand_in = [json.loads(line).get("stand_in", False) for line in lines]
     assert any(stand_in) == bool(chosen_for)
+    assert bool(stored_view(session.view.path).stand_in) == stand_in[-1]  # whoever opens the run later knows it, too
     if chosen_for:
         between = replace(tab.view, question=None, stand_in=chosen_for)
         told = texts.heading(between, tab.selection)

@@ -115,12 +115,7 @@ def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> 
         "min": low,
         "max": high,
         "nameTruncate": {"maxWidth": LONGEST_NAME},
-        "axisLabel": {
-            **TEXT,
-            "showMinLabel": False,
-            "showMaxLabel": False,
-            "hideOverlap": True,
-        },
+        "axisLabel": {**TEXT, "showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
         "axisLine": {"onZero": False, "lineStyle": {"color": GREY}},
         "splitLine": {"lineStyle": {"color": "#ececec"}},
         "splitNumber": 5,

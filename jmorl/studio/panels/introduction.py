@@ -19,7 +19,7 @@ class Introduction:
 
     def __init__(self, tab: Tab):
         with ui.element("section").classes("bar introduction").props('aria-label="Introduction"'):
-            ui.label(texts.introduction(tab.view)).classes("introducing")
+            ui.label(texts.introduction(tab.view))
             ui.button("Got it").props("no-caps dense flat").on("click", js_handler=REMEMBER)
 
     def show(self) -> None:
