@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from envs.checks import NotAsDeclared, check_declaration, check_environment
-from envs.core import Environment, EpisodeState, Objective, Step, Transition
+from envs.core import Environment, EpisodeState, Objective, Reading, Step, Transition
 from envs.failures import failure
 from envs.half_cheetah import HalfCheetah
 from envs.hopper import Hopper, Hopper2
@@ -30,6 +30,7 @@ __all__ = [
     "EpisodeState",
     "NotAsDeclared",
     "Objective",
+    "Reading",
     "Step",
     "Transition",
     "check_environment",

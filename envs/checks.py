@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from envs.core import Environment, Objective, Transition
+from envs.core import Environment, Objective, Reading, Transition
 from envs.failures import failure
 from envs.tracing import Traced, kept_tracers, traced
 
@@ -90,6 +90,10 @@ def _wrong_objectives(environment: Environment[Any]) -> Iterator[str]:
         yield "the name, label and unit of an objective are not all texts"
     if not all(isinstance(each.highest, int | float) and each.highest > -math.inf for each in objectives):
         yield "the highest return of an objective is not a number"
+    if not all(each.reading is None or isinstance(each.reading, Reading) for each in objectives):
+        yield "the reading of an objective is not of the kind envs.Reading"
+    elif not all(isinstance(each.read.mean_over, int) and each.read.mean_over >= 1 for each in objectives):
+        yield "mean_over, the steps that a reading is the mean of, is not a whole number of at least 1"
     if len({objective.name for objective in objectives}) < len(objectives):
         yield "two objectives have the same name"
 

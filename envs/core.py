@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 from numpy.typing import ArrayLike
 
@@ -26,17 +27,55 @@ PhysicsState = TypeVar("PhysicsState")
 
 
 @dataclass(frozen=True)
+class Reading:
+    """How people say a return: in a unit of its own, with a sign of its own, as a sum or as a mean.
+
+    With `less_is_better` the sign is turned: a return of -94.5 `-steps` reads 94.5 steps. With `mean_over`, the number
+    of steps that every episode has, it is a mean of the steps: 4,060 `m/s·steps` over 1,000 steps read 4.06 m/s.
+    """
+
+    unit: str
+    less_is_better: bool = False
+    mean_over: int = 1  # 1: the sum over an episode
+
+    @property
+    def scale(self) -> float:
+        """What a return is multiplied by."""
+        return (-1 if self.less_is_better else 1) / self.mean_over
+
+    def of(self, returns: ArrayLike) -> np.ndarray:  # [...]
+        """Return undiscounted returns [...] as people say them; never -0."""
+        return np.asarray(returns, float) * self.scale + 0.0
+
+    def so_far(self, totals: ArrayLike) -> np.ndarray:  # [T + 1]
+        """Return the totals [T + 1] before and after each step of an episode as people say them: means of what was."""
+        steps = np.maximum(np.arange(len(np.asarray(totals))), 1)
+        return self.of(totals) * (self.mean_over / steps if self.mean_over > 1 else 1)
+
+    def to_return(self, number: float) -> float:
+        """Return the undiscounted return that reads so."""
+        return number / self.scale + 0.0
+
+
+@dataclass(frozen=True)
 class Objective:
     """One component of the vector reward. Always maximised.
 
-    `label` is the quantity and `unit` what an undiscounted return is measured in, as shown on
-    axes and in tables. No return is above `highest`, so that nothing better is ever promised.
+    `label` is the quantity and `unit` what an undiscounted return is measured in. No return is above `highest`, so
+    that nothing better is ever promised. `reading` is how people say a return, on the page, at the terminal and in
+    plots; without one they say it as it is. Files, settings and reports have returns.
     """
 
     name: str
     label: str
     unit: str
     highest: float = math.inf
+    reading: Reading | None = None
+
+    @property
+    def read(self) -> Reading:
+        """How people say a return of this objective."""
+        return self.reading or Reading(self.unit)
 
 
 class Transition(NamedTuple):

@@ -8,7 +8,7 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 
-from envs.core import Objective, Transition
+from envs.core import Objective, Reading, Transition
 from envs.drawing import Part
 from envs.physics import BodyState
 from envs.runner import Runner
@@ -17,6 +17,7 @@ FRAME_SKIP = 5
 TIMESTEP = 0.01  # seconds, of the model
 JOINTS = 9  # three of the torso, then three of each leg
 RESET_NOISE = 0.1
+STEPS = 1000  # of every episode
 
 
 class HalfCheetah(Runner):
@@ -24,12 +25,14 @@ class HalfCheetah(Runner):
 
     id = "mo-halfcheetah-v5"
     objectives: ClassVar = (
-        Objective("speed", "speed", "m/s·steps"),
-        Objective("energy", "energy", "-control²·steps", highest=0.0),
+        Objective("speed", "speed", "m/s·steps", reading=Reading("m/s", mean_over=STEPS)),
+        Objective(
+            "energy", "energy", "-control²·steps", 0.0, Reading("control²", less_is_better=True, mean_over=STEPS)
+        ),
     )
     observation_size = 2 * JOINTS - 1
     action_size = 6
-    time_limit = 1000
+    time_limit = STEPS
     step_seconds = FRAME_SKIP * TIMESTEP
     model_name = "half_cheetah"
     frame_skip = FRAME_SKIP

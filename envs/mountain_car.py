@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
-from envs.core import Environment, Objective, Transition
+from envs.core import Environment, Objective, Reading, Transition
 from envs.drawing import Disk, Point, Polygon, Polyline, Scene, Shape, Window
 
 POWER = 0.0015
@@ -36,8 +36,8 @@ class MountainCar(Environment[CarState]):
     id = "mo-mountaincarcontinuous-v0"
     family = "MO-Gymnasium"
     objectives: ClassVar = (
-        Objective("time", "time", "-steps", highest=0.0),
-        Objective("fuel", "fuel", "-force²·steps", highest=0.0),
+        Objective("time", "time", "-steps", highest=0.0, reading=Reading("steps", less_is_better=True)),
+        Objective("fuel", "fuel", "-force²·steps", highest=0.0, reading=Reading("force²·steps", less_is_better=True)),
     )
     observation_size = 2
     action_size = 1

@@ -80,4 +80,4 @@ def measured_in(units: str, objectives: Sequence[Objective]) -> tuple[Objective,
     """Return the objectives as scores have them: in "paper" units they have lost those of the environment."""
     if units == "raw":
         return tuple(objectives)
-    return tuple(replace(objective, unit=DRIFTING, highest=math.inf) for objective in objectives)
+    return tuple(replace(objective, unit=DRIFTING, highest=math.inf, reading=None) for objective in objectives)

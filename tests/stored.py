@@ -15,7 +15,7 @@ def stored_linear_policy(path, environment_id: str, gain) -> StoredPolicy:
     header = {
         "format": FORMAT,
         "environment": environment_id,
-        "objectives": [vars(objective) for objective in environment.objectives],
+        "objectives": [{"name": o.name, "label": o.label, "unit": o.unit} for o in environment.objectives],
         "id": 17,
         "values": [0.0] * len(environment.objectives),
         "discount": 0.9,

@@ -15,7 +15,7 @@ from jmorl.display.console import PlainConsole
 LONGEST_NUMBER = 9  # digits
 POLICY_HELP = """\
 A policy is one way to act that was trained. Its scores are means over episodes, ± their spread from episode to episode;
-more is better, so of two below zero the one nearer to it. Training goes on around your choice: it looks for nothing
+more is better, unless the head of the column says less. Training goes on around your choice: it looks for nothing
 that is much worse. To choose otherwise later: jmorl branch RUN --generation K --out NEW.
   12           choose policy 12
   Enter        keep the last choice: none of these is better
@@ -23,7 +23,7 @@ that is much worse. To choose otherwise later: jmorl branch RUN --generation K -
   same         no difference between these
   {limit}
                rule out what does not reach this; none takes it back
-  {more:<12} list the policies with the most of an objective first
+  {best:<12} list the policies that are best in an objective first
   all          list every policy, where only some are shown; the others can be chosen, too
   12 go 5      choose policy 12, then no question for 5 rounds (or go 5)
   12 q         choose policy 12 and end (q or Ctrl-D: with the last choice)
@@ -113,10 +113,9 @@ def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, .
     """
     words = line.lower().replace("−", "-").replace(",", " ").replace(">", " ").split()
     name = question.objectives[-1].name
-    middle = f"{float(np.median(question.values[:, -1])):.3g}"
     if words[:1] in (["?"], ["help"]):
-        return POLICY_HELP.format(more=f"more {name}", limit=f"limit {name} {middle}")
-    if words[:1] == ["more"]:
+        return POLICY_HELP.format(best=f"best {name}", limit=f"limit {name} {_middle(question)}")
+    if words[:1] == ["best"]:
         return _objective(question.objectives, " ".join(words[1:]))
     if words[:1] == ["limit"]:
         return _limits(question, words[1:])
@@ -214,21 +213,26 @@ def _limits(question: Question, words: list[str]) -> tuple[float, ...] | str:
     *named, value = words or [""]
     index = _objective(question.objectives, " ".join(named)) if named else ""
     if isinstance(index, str):
-        name, middle = question.objectives[-1].name, float(np.median(question.values[:, -1]))
+        name = question.objectives[-1].name
         names = ", ".join(objective.name for objective in question.objectives)
         return (
-            f"Name an objective ({names}) and what it must reach, for example: limit {name} {middle:.3g}; or: limit "
-            f"{name} none"
+            f"Name an objective ({names}) and what it must reach, for example: limit {name} {_middle(question)}; or: "
+            f"limit {name} none"
         )
     try:
-        limit = -math.inf if value == "none" else float(value)
+        number = None if value == "none" else float(value)
     except ValueError:
-        limit = math.nan
-    if math.isnan(limit) or limit == math.inf:
+        number = math.nan
+    if number is not None and not math.isfinite(number):
         return f"A limit is a number, or none; {value!r} is neither."
     limits = list(question.limits or [-math.inf] * len(question.objectives))
-    limits[index] = limit
+    limits[index] = -math.inf if number is None else question.objectives[index].read.to_return(number)
     return tuple(limits)
+
+
+def _middle(question: Question) -> str:
+    """Return a score in the last objective that about half of the policies reach, as people say it."""
+    return f"{float(np.median(question.objectives[-1].read.of(question.values[:, -1]))):.3g}"
 
 
 def _objective(objectives: tuple[Objective, ...], named: str) -> int | str:
@@ -244,7 +248,7 @@ def _objective(objectives: tuple[Objective, ...], named: str) -> int | str:
     if len(matching) == 1:
         return matching[0]
     names = ", ".join(f"{number} {objective.name}" for number, objective in enumerate(objectives, start=1))
-    return f"More of what? Name one of the objectives: {names}. For example: more {objectives[0].name}"
+    return f"Best in what? Name one of the objectives: {names}. For example: best {objectives[0].name}"
 
 
 def _number(word: str) -> int | None:

@@ -7,16 +7,17 @@ import numpy as np
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion, Question
 from jmorl.display.console import PlainConsole
-from jmorl.display.fronts import front_scatter, front_table, stacked_label
+from jmorl.display.fronts import front_scatter, front_table
+from jmorl.display.readings import Writer, bounds_in_words, reading_label, writers_for
 from jmorl.display.tables import PlainTable
-from jmorl.display.text import front_question, number_format, plural
+from jmorl.display.text import front_question, plural
 from jmorl.search.bounds import within
 
 PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
 
 def show_front(console: PlainConsole, question: Question, by: int) -> None:
-    """Show the question, its front with the most of objective `by` first, and a plot of it."""
+    """Show the question, its front with the best in objective `by` first, and a plot of it."""
     heading = front_question(question.purpose, question.generation, len(question.front), question.form, question.again)
     table = front_table(
         question.front,
@@ -49,11 +50,7 @@ def limits_in_words(question: Question) -> str:
     limits = np.array(question.limits or ())
     if not np.isfinite(limits).any():
         return ""
-    named = ", ".join(
-        f"{objective.label} ≥ {limit:g}"
-        for objective, limit in zip(question.objectives, limits, strict=True)
-        if np.isfinite(limit)
-    )
+    named = bounds_in_words(limits, [Writer(objective, "g") for objective in question.objectives])
     count = int(within(question.values, limits).sum())
     if count:
         return f"Your limits: {named}. {count} of these {len(question.front)} reach them."
@@ -73,15 +70,13 @@ def show_points(console: PlainConsole, question: PointQuestion) -> None:
 
 def points_table(question: PointQuestion) -> PlainTable:
     """One row per point: what can still come of it, how near the front it is, and the policy it heads for."""
-    formats = [number_format(column) for column in question.state.values.T]
-    ranges = (f"{stacked_label(objective)}\nworst to best" for objective in question.objectives)
+    writers = writers_for(question.state.values, question.objectives)
+    ranges = (f"{reading_label(objective)}\nworst to best" for objective in question.objectives)
     table = PlainTable("point", *ranges, "closeness", "policies", "heads for")
     for number, point in enumerate(question.points, start=1):
-        cells = [
-            f"{worst:{fmt}} to {best:{fmt}}" for worst, best, fmt in zip(point.value, point.best, formats, strict=True)
-        ]
+        cells = [writer.span(worst, best) for writer, worst, best in zip(writers, point.value, point.best, strict=True)]
         heads_for = question.front[point.representative]
-        values = ", ".join(f"{value:{fmt}}" for value, fmt in zip(heads_for.values, formats, strict=True))
+        values = ", ".join(writer.value(value) for writer, value in zip(writers, heads_for.values, strict=True))
         table.add_row(
             str(number), *cells, f"{point.closeness:.0f} %", str(point.reachable.sum()), f"{heads_for.id} ({values})"
         )
@@ -99,7 +94,7 @@ def show_plot(
     if len(objectives) == 2:
         plot = front_scatter(objectives, values, marks, min(console.width, PLOT_WIDTH), PLOT_HEIGHT)
         console.print(plot, soft_wrap=True)
-        console.print(legend)
+        console.print(f"{legend}; better is to the right and above")
 
 
 def _show(console: PlainConsole, heading: str, table: PlainTable) -> None:

@@ -8,8 +8,9 @@ from rich.text import Text
 
 from envs.core import Objective
 from jmorl.display.limits import around, inside
+from jmorl.display.readings import Writer, direction, writers_for
 from jmorl.display.tables import PlainTable
-from jmorl.display.text import number_format, plural
+from jmorl.display.text import plural
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy, values_of
 from jmorl.search.scaling import core
@@ -29,9 +30,9 @@ def front_table(
     limits: Sequence[float] | None = None,
     previous_name: str = "last choice",
 ) -> PlainTable:
-    """One row for each of at least one policy, the most of objective `by` first.
+    """One row for each of at least one policy, the best in objective `by` first.
 
-    Values are in raw units, with their standard deviation over the evaluation episodes; weights are those the
+    Scores are as people say them, with their standard deviation over the evaluation episodes; weights are those the
     policy was trained with, and gen the generation it was born in, 0 being the warm-up. What lies outside the
     bounds [M], or does not reach the limits [M] that somebody has set, is dimmed.
     """
@@ -39,7 +40,8 @@ def front_table(
     stds = np.stack([policy.std for policy in policies])
     bounded = np.ones(len(policies), bool) if bounds is None else within(values, bounds)
     good = np.ones(len(policies), bool) if limits is None else within(values, np.array(limits))
-    scores = [_scores(*column) for column in zip(values.T, stds.T, strict=True)]
+    columns = zip(writers_for(values, objectives), values.T, stds.T, strict=True)
+    scores = [_scores(*column) for column in columns]
     table = PlainTable("policy", *map(stacked_label, objectives), "weights", "gen", "")
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
@@ -78,6 +80,7 @@ def front_scatter(
 ) -> Text:
     """Draw the vectors as o and the marks as their characters, in plain text; for two objectives.
 
+    The better is to the right and above, numbers are as people say them.
     What is far out is left out, with a word about it, unless a mark is as far out. `width` and `height` are in
     characters, all included.
     """
@@ -91,7 +94,7 @@ def front_scatter(
     figure.with_colors = False
     figure.origin = False
     figure.x_label, figure.y_label = (objective.label for objective in objectives)
-    figure.x_ticks_fkt, figure.y_ticks_fkt = (_tick_format(column) for column in shown.T)
+    figure.x_ticks_fkt, figure.y_ticks_fkt = (_tick_format(writer) for writer in writers_for(shown, objectives))
     figure.scatter(values[near, 0], values[near, 1], marker="o")
     for character, point in marks.items():
         figure.text([point[0]], [point[1]], [character])
@@ -101,19 +104,18 @@ def front_scatter(
 
 
 def stacked_label(objective: Objective) -> str:
-    """Return the quantity above its unit, for the head of a column."""
-    return f"{objective.label}\n({objective.unit})"
+    """Return the quantity above its unit and, where that is so, that less is better: the head of a column."""
+    less = f"\n{direction(objective)}" if objective.read.less_is_better else ""
+    return f"{objective.label}\n({objective.read.unit}){less}"
 
 
-def _scores(values: np.ndarray, stds: np.ndarray) -> list[str]:
-    """`-66.1  ±0.4` for each of the values [N], the values under each other."""
-    fmt = number_format(values)
-    texts = [f"±{std:{fmt}}" for std in stds]
+def _scores(writer: Writer, values: np.ndarray, stds: np.ndarray) -> list[str]:
+    """`66.1  ±0.4` for each of the values [N], the values under each other."""
+    texts = [f"±{writer.size(std)}" for std in stds]
     width = max(map(len, texts))
-    return [f"{value:{fmt}} {text:>{width}}" for value, text in zip(values, texts, strict=True)]
+    return [f"{writer.value(value)} {text:>{width}}" for value, text in zip(values, texts, strict=True)]
 
 
-def _tick_format(values: np.ndarray) -> Callable[[float, float], str]:
+def _tick_format(writer: Writer) -> Callable[[float, float], str]:
     """How plotille shall write a tick: by the lower end of its interval."""
-    fmt = number_format(values)
-    return lambda low, _: f"{low:{fmt}}"
+    return lambda low, _: writer.value(low)

@@ -1,12 +1,11 @@
-"""Numbers and objectives as people read them."""
+"""Numbers, counts and questions as people read them."""
 
 import math
-from collections.abc import Sequence
+import re
 
 import numpy as np
 
 from envs.core import Objective
-from jmorl.search.policy import Policy
 from jmorl.search.scaling import core
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
@@ -57,6 +56,11 @@ def duration(seconds: float) -> str:
     return f"{hours} h {rest} min"
 
 
+def minus(text: str) -> str:
+    """Write numbers with the sign for minus that is as wide as a digit."""
+    return re.sub(r"(?<!\w)-(?=\d)", "\N{MINUS SIGN}", text)
+
+
 def plural(count: int, noun: str) -> str:
     """`1 step`, `2 steps`, `2 policies`."""
     if count == 1:
@@ -82,29 +86,5 @@ def front_question(purpose: str, generation: int, policies: int, form: str = "be
 
 
 def objective_label(objective: Objective) -> str:
-    """Return the quantity and its unit, for headings and axes."""
+    """Return the quantity and the unit of its returns, for headings and axes."""
     return f"{objective.label} ({objective.unit})"
-
-
-def confirmed_in_words(policy: Policy, objectives: Sequence[Objective]) -> str:
-    """`time -58.2 ±0.4, ... on 128 fresh episodes, 99 % sure; time -57.9, ... in the search`; or nothing."""
-    found = policy.confirmation
-    if found is None:
-        return ""
-    formats = [number_format(np.array([0.0, error]), digits=2) for error in found.error]
-    scores = ", ".join(
-        f"{objective.label} {value:{fmt}} ±{error:{fmt}}"
-        for objective, value, error, fmt in zip(objectives, policy.values, found.error, formats, strict=True)
-    )
-    claimed = values_in_words(found.claimed, objectives, formats)
-    return f"{scores} on {found.episodes} fresh episodes, 99 % sure; {claimed} in the search"
-
-
-def values_in_words(
-    values: Sequence[float] | np.ndarray, objectives: Sequence[Objective], formats: Sequence[str], relation: str = ""
-) -> str:
-    """`time -66.1, fuel -57.3` for a vector [M], or with the relation "≥ " `time ≥ -66.1, fuel ≥ -57.3`."""
-    return ", ".join(
-        f"{objective.label} {relation}{value:{fmt}}"
-        for objective, value, fmt in zip(objectives, values, formats, strict=True)
-    )

@@ -7,8 +7,9 @@ from rich.console import RenderableType
 
 from envs.core import Objective
 from jmorl.display.fronts import front_table, stacked_label
+from jmorl.display.readings import writers_for
 from jmorl.display.tables import PlainTable
-from jmorl.display.text import duration, number, number_format, plural, short_count
+from jmorl.display.text import duration, number, plural, short_count
 from jmorl.events import Blended
 from jmorl.search.families import Blending, largest_gap
 from jmorl.search.policy import values_of
@@ -52,12 +53,11 @@ def _front(event: Blended) -> PlainTable:
 def _families(blending: Blending, objectives: Sequence[Objective]) -> PlainTable:
     """Return one row for each family of the front: its policies, and where they lie."""
     by_id = {policy.id: policy for policy in blending.front}
-    formats = [number_format(column) for column in values_of(blending.front).T]
+    writers = writers_for(values_of(blending.front), objectives)
     table = PlainTable("policies", *map(stacked_label, objectives), words=["policies"])
     table.title = "Families: half-way between neighbours of one, blends lose next to nothing"
     for family in blending.families:
         values = values_of([by_id[each] for each in family])
-        ends = zip(values.min(axis=0), values.max(axis=0), formats, strict=True)
-        cells = [f"{low:{fmt}}" if low == high else f"{low:{fmt}} to {high:{fmt}}" for low, high, fmt in ends]
-        table.add_row(" ".join(map(str, family)), *cells)
+        ends = zip(writers, values.min(axis=0), values.max(axis=0), strict=True)
+        table.add_row(" ".join(map(str, family)), *(writer.span(worst, best) for writer, worst, best in ends))
     return table

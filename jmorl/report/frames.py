@@ -13,7 +13,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from envs.drawing import Capsule, Disk, Label, Point, Polygon, Polyline, Scene, Shape
-from jmorl.display.text import number_format, objective_label
+from jmorl.display.readings import reading_label
+from jmorl.display.text import number_format
 from jmorl.playback import Recording
 from jmorl.report.style import BLUE, GREY, INK, ORANGE, RED
 from jmorl.storage.policy_file import policy_name
@@ -49,7 +50,7 @@ def film_frame(recording: Recording, step: int, width: int) -> Image.Image:
     for index, (objective, total) in enumerate(totals):
         row, column = divmod(index, columns)
         x, y = margin + column * (width - 2 * margin) / columns, size * (2.7 + 3.1 * row)
-        draw.text((x, y), objective_label(objective), GREY, _font(size))
+        draw.text((x, y), reading_label(objective), GREY, _font(size))
         draw.text((x, y + 1.2 * size), total, INK, _font(1.4 * size, bold=True))
     return frame
 
@@ -67,7 +68,7 @@ def strip(recording: Recording, width: int) -> Image.Image:
         picture.paste(panel, (gap + column * (panel.width + gap), head + row * height))
     draw = ImageDraw.Draw(picture)
     draw.text((gap, size), _title(recording), INK, _font(1.2 * size, bold=True))
-    units = ", ".join(map(objective_label, recording.environment.objectives))
+    units = ", ".join(map(reading_label, recording.environment.objectives))
     draw.text((width - gap, size), f"so far: {units}", GREY, _font(size), anchor="ra")
     return picture
 
@@ -151,8 +152,10 @@ def _time(recording: Recording, step: int) -> str:
 
 
 def _totals(recording: Recording, step: int) -> list[str]:
-    """Return the objectives so far, in the same format throughout the episode, and never -0."""
-    return [f"{column[step]:z{number_format(column)}}" for column in recording.totals.T]
+    """Return the objectives so far as people say them, in the same format throughout the episode, and never -0."""
+    columns = zip(recording.environment.objectives, recording.totals.T, strict=True)
+    readings = [objective.read.so_far(column) for objective, column in columns]
+    return [f"{column[step]:z{number_format(column)}}" for column in readings]
 
 
 @cache

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import envs
 from jmorl.display.console import PlainConsole
-from jmorl.display.text import confirmed_in_words, number_format, plural, values_in_words
+from jmorl.display.readings import confirmed_in_words, values_in_words, writers_for
+from jmorl.display.text import plural
 from jmorl.report.tables import run_tables
 from jmorl.search.policy import values_of
 from jmorl.storage.files import written_whole
@@ -66,8 +67,7 @@ def _result(run: StoredRun) -> str:
     """Say what came of a run."""
     if run.chosen is None:
         return "The run has not ended."
-    formats = [number_format(column) for column in values_of(run.front).T]
-    plain = values_in_words(run.chosen.values, run.objectives, formats)
+    plain = values_in_words(run.chosen.values, writers_for(values_of(run.front), run.objectives))
     return f"The result is policy {run.chosen.id}: {confirmed_in_words(run.chosen, run.objectives) or plain}."
 
 

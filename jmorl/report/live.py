@@ -18,16 +18,8 @@ from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_scatter, front_table
-from jmorl.display.text import (
-    REASONS,
-    confirmed_in_words,
-    duration,
-    number,
-    number_format,
-    plural,
-    short_count,
-    values_in_words,
-)
+from jmorl.display.readings import bounds_in_words, confirmed_in_words, values_in_words, writers_for
+from jmorl.display.text import REASONS, duration, number, plural, short_count
 from jmorl.events import Event, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.report.watchers import Watcher, show_result
@@ -150,11 +142,11 @@ class LiveView(Watcher):
                 yield "utility", f"best {number(best)}" + ("" if mean is None else f", mean {number(mean)}")
         if timeline.decided and timeline.decided.chosen:
             decided, choice = timeline.decided, timeline.decided.chosen
-            formats = [number_format(column) for column in decided.question.values.T]
-            values = values_in_words(choice.values, self.objectives, formats)
+            writers = writers_for(decided.question.values, self.objectives)
+            values = values_in_words(choice.values, writers)
             yield "chosen" if timeline.result else "last choice", f"policy {choice.id}: {values}"
             if np.isfinite(decided.bounds).any():
-                yield "bounds", values_in_words(decided.bounds, self.objectives, formats, "≥ ")
+                yield "bounds", bounds_in_words(decided.bounds, writers)
         if timeline.finished and timeline.finished.candidates == 1 and timeline.decided:
             yield "", "nothing but the choice itself lay within the bounds"
 

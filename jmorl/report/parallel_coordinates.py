@@ -9,14 +9,23 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from jmorl.display.text import number_format, objective_label
+from envs.core import Objective
+from jmorl.display.readings import reading_label
 from jmorl.report.front_plot import close_view, draw_policies, front_name, legend_of, note_outside
-from jmorl.report.style import BLUE, INK, RED, generation_bar, generation_colour, legend_below, new_figure
+from jmorl.report.style import (
+    BLUE,
+    INK,
+    RED,
+    ReadingFormatter,
+    generation_bar,
+    generation_colour,
+    legend_below,
+    new_figure,
+)
 from jmorl.search.policy import values_of
 from jmorl.storage.stored_run import StoredRun
 
 BOUNDS_BAR: dict[str, Any] = {"color": BLUE, "alpha": 0.25, "linewidth": 9}
-MINUS = "\N{MINUS SIGN}"  # as on matplotlib's own axes
 WHITE: dict[str, Any] = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
 
 
@@ -27,9 +36,9 @@ def parallel_figure(run: StoredRun, title: str) -> Figure:
     figure = new_figure(max(2.6 * count, 7.0) + 1.0, 5.6, title)
     axes = figure.subplots()
     for index in range(count):
-        _draw_scale(axes, index, limits[:, index])
+        _draw_scale(axes, index, run.objectives[index], limits[:, index])
     handles = _draw_lines(axes, run, limits)
-    axes.set_xticks(range(count), [objective_label(objective) for objective in run.objectives])
+    axes.set_xticks(range(count), [reading_label(objective) for objective in run.objectives])
     axes.set_xlim(-0.35, count - 0.85)
     axes.set_ylim(0, 1)
     axes.tick_params(axis="x", length=0)
@@ -84,15 +93,13 @@ def _heights(values: np.ndarray, limits: np.ndarray) -> np.ndarray:
     return (values - limits[0]) / np.ptp(limits, axis=0)
 
 
-def _draw_scale(axes: Axes, index: int, limits: np.ndarray) -> None:
-    """Return the axis of an objective with its ticks, in raw units, between the limits [2]."""
+def _draw_scale(axes: Axes, index: int, objective: Objective, limits: np.ndarray) -> None:
+    """Draw the axis of an objective between the limits [2], with its ticks as people say them."""
     axes.axvline(index, color=INK, linewidth=0.9, zorder=2)
     low, high = limits
     ticks = MaxNLocator(6).tick_values(low, high)
     ticks = ticks[(ticks >= low) & (ticks <= high)]
-    fmt = number_format(ticks, digits=2)
-    for tick in ticks:
+    for tick, text in zip(ticks, ReadingFormatter(objective).format_ticks(ticks), strict=True):
         height = (tick - low) / (high - low)
-        text = f"{tick:{fmt}}".replace("-", MINUS)
         axes.plot([index - 0.02, index], [height, height], color=INK, linewidth=0.9, zorder=2)
         axes.text(index - 0.035, height, text, ha="right", va="center", fontsize=8.5, bbox=WHITE, zorder=5)

@@ -15,10 +15,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import Formatter, MaxNLocator
 
 from envs.core import Objective
-from jmorl.display.text import objective_label
+from jmorl.display.text import minus
 from jmorl.storage.files import written_whole
 
 DOTS_PER_INCH = 150
@@ -26,6 +26,7 @@ TITLE_CHARACTERS = 10.5  # of a title in an inch
 # Okabe and Ito's colours, which colour-blind people can tell apart.
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 INK, GREY, PALE = "#222222", "#767676", "#b8b8b8"
+MOST_PLACES, LARGE = 7, 1e7  # of a tick: more decimals, and larger numbers, are written with an exponent
 SETTINGS: dict[Any, Any] = {
     "figure.dpi": DOTS_PER_INCH,
     "savefig.dpi": DOTS_PER_INCH,
@@ -108,9 +109,36 @@ def legend_below(figure: Figure, handles: Sequence[Artist], columns: int) -> Non
 
 
 def label_axes(axes: Axes, x: Objective, y: Objective) -> None:
-    """Quantity and unit at both axes."""
-    axes.set_xlabel(objective_label(x))
-    axes.set_ylabel(objective_label(y))
+    """Label both axes of returns as people say them: quantity, unit, numbers. The better stays to the right and up."""
+    for axis, objective in ((axes.xaxis, x), (axes.yaxis, y)):
+        axis.set_label_text(axis_label(objective))
+        axis.set_major_formatter(ReadingFormatter(objective))
+
+
+def axis_label(objective: Objective) -> str:
+    """Return the quantity, its unit, and that less is better where an axis runs from the larger to the smaller."""
+    less = ", less is better" if objective.read.less_is_better else ""
+    return f"{objective.label} ({objective.read.unit}{less})"
+
+
+class ReadingFormatter(Formatter):
+    """Writes the ticks of an axis of returns as people say them, with as many decimals as tell them apart."""
+
+    def __init__(self, objective: Objective):
+        self.objective = objective
+
+    def format_ticks(self, values: Sequence[float]) -> list[str]:
+        """Return a text for each tick."""
+        numbers = self.objective.read.of(values)
+        enough = (
+            count for count in range(MOST_PLACES) if np.allclose(numbers, numbers.round(count), rtol=0, atol=1e-9)
+        )
+        places = next(enough, None) if np.abs(numbers).max(initial=0.0) < LARGE else None
+        return [minus(f"{number:z.5g}" if places is None else f"{number:z.{places}f}") for number in numbers]
+
+    def __call__(self, value: float, position: int | None = None) -> str:
+        """Return the text of one tick."""
+        return self.format_ticks([value])[0]
 
 
 def note(axes: Axes, text: str) -> None:

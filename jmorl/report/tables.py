@@ -12,10 +12,10 @@ import envs
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
 from jmorl.display.fronts import front_table, stacked_label
+from jmorl.display.readings import Writer, bounds_in_words, confirmed_in_words, writers_for
 from jmorl.display.tables import PlainTable
 from jmorl.display.text import (
     REASONS,
-    confirmed_in_words,
     duration,
     number,
     number_format,
@@ -103,26 +103,28 @@ def metrics_table(run: StoredRun) -> PlainTable:
 
 def decisions_table(run: StoredRun) -> PlainTable:
     """One row for each answer, with the policy it prefers."""
-    formats = [number_format(column) for column in values_of(run.front).T]
+    writers = writers_for(values_of(run.front), run.objectives)
     headings = map(stacked_label, run.objectives)
     table = PlainTable("gen", "question", "among", "policy", *headings, "", title="Decisions")
     for record in run.decisions:
         if isinstance(record, DecisionRecord):
-            cells = [f"{value:{fmt}}" for value, fmt in zip(record.values, formats, strict=True)]
+            cells = [writer.value(value) for writer, value in zip(writers, record.values, strict=True)]
             among = str(len(record.shown)) if record.shown else ""
             question = f"{record.purpose}, again" if record.again else record.purpose
-            table.add_row(str(record.generation), question, among, str(record.policy), *cells, _kind_of_answer(record))
+            kind = _kind_of_answer(record, writers)
+            table.add_row(str(record.generation), question, among, str(record.policy), *cells, kind)
     return table
 
 
-def _kind_of_answer(record: DecisionRecord) -> str:
+def _kind_of_answer(record: DecisionRecord, writers: Sequence[Writer]) -> str:
     """Say what there is of an answer besides the policy that the run went on with."""
+    limits = [-np.inf if limit is None else limit for limit in record.limits or ()]
     known = {
         "by the stand-in": record.stand_in,
         "no difference": record.equal,
         f"in the order {' '.join(map(str, record.ranking))}": record.ranking,
         f"go on for {plural(record.generations, 'generation')}": record.generations > 1,
-        f"limits {' '.join('none' if each is None else f'{each:g}' for each in record.limits or ())}": record.limits,
+        f"limits: {(bounds_in_words(limits, writers) if limits else '') or 'none'}": record.limits,
         "stop": record.stop,
     }
     return ", ".join(text for text, applies in known.items() if applies)
@@ -148,9 +150,9 @@ def evaluation_table(header: Mapping[str, Any], returns: EpisodeReturns) -> Plai
 
 
 def scores_in_words(header: Mapping[str, Any]) -> str:
-    """Return the scores of a stored policy with this header: `time -66.1, fuel -57.3`."""
+    """Return the returns of a stored policy with this header: `time -66.1 -steps, fuel -57.3 -force²·steps`."""
     return ", ".join(
-        f"{objective['label']} {number(value)}"
+        f"{objective['label']} {number(value)} {objective['unit']}"
         for objective, value in zip(header["objectives"], header["values"], strict=True)
     )
 

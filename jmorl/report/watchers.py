@@ -14,16 +14,8 @@ from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_table
-from jmorl.display.text import (
-    REASONS,
-    confirmed_in_words,
-    duration,
-    number,
-    number_format,
-    plural,
-    short_count,
-    values_in_words,
-)
+from jmorl.display.readings import bounds_in_words, confirmed_in_words, values_in_words, writers_for
+from jmorl.display.text import REASONS, duration, number, plural, short_count
 from jmorl.events import Blended, Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.search.families import Blending
@@ -234,19 +226,19 @@ def question_name(decided: Decided) -> str:
 
 
 def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
-    """`policy 12 (time -66.1, fuel -57.3) of 9 shown; bounds time ≥ -70.2, fuel ≥ -60.4`."""
+    """`policy 12 (time 66.1, fuel 57.3) of 9 shown; bounds time ≤ 70.2, fuel ≤ 60.4`."""
     question, chosen = decided.question, decided.chosen
     if chosen is None:
         answer = ", ".join(f"{name} {value}" for name, value in question.to_json(decided.answer).items())
         return f"{answer} ({plural(len(question.shown), 'policy')} shown)"
-    formats = [number_format(column) for column in question.values.T]
-    values = values_in_words(chosen.values, objectives, formats)
+    writers = writers_for(question.values, objectives)
+    values = values_in_words(chosen.values, writers)
     choice = f"policy {chosen.id} ({values}) of {len(question.shown)} shown{_more_of_answer(decided)}"
     if question.stops(decided.answer):
         return f"{choice}, and stop"
     if question.purpose == "final":
         return choice
-    bounds = values_in_words(decided.bounds, objectives, formats, "≥ ")
+    bounds = bounds_in_words(decided.bounds, writers) or "none"
     silent = decided.generations_to_question or 0
     more = f", no question for {plural(silent, 'generation')}" if silent > 1 else ""
     return f"{choice}; bounds {bounds}{more}"

@@ -1,10 +1,13 @@
 """A recorded episode as JSON for the player on the page.
 
-Shapes that do not move are given once; every frame has its own shapes of what moves, and its own totals.
+Shapes that do not move are given once; every frame has its own shapes of what moves, and its own totals, as people say
+them.
 """
 
 from math import ceil
 from typing import Any
+
+import numpy as np
 
 from jmorl.playback import Recording
 from jmorl.report.playback import STEP_SECONDS
@@ -26,12 +29,14 @@ def episode_json(recording: Recording) -> dict[str, Any]:
     steps = [*range(0, recording.steps, stride), recording.steps]
     scenes = [recording.scene(step).to_json() for step in steps]
     still = _still(scenes)
+    columns = zip(recording.environment.objectives, recording.totals.T, strict=True)
+    totals = np.stack([objective.read.so_far(column) for objective, column in columns], axis=1)
     frames = [
         {
             "step": step,
             "window": _rounded(scene["window"]),
             "shapes": _rounded(scene["shapes"][still:]),
-            "totals": _rounded(recording.totals[step].tolist()),
+            "totals": _rounded(totals[step].tolist()),
         }
         for step, scene in zip(steps, scenes, strict=True)
     ]

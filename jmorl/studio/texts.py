@@ -1,11 +1,11 @@
 """The texts of the page."""
 
-import re
 from functools import lru_cache
 
 import numpy as np
 
-from jmorl.display.text import duration, front_question, number_format, plural, short_count, values_in_words
+from jmorl.display.readings import Writer, values_in_words, writers_for
+from jmorl.display.text import duration, front_question, minus, plural, short_count
 from jmorl.report.timeline import Timeline
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
@@ -122,7 +122,7 @@ def heading(view: View, selection: Selection) -> str:
         last = view.timeline is not None and view.timeline.left == 1 and purpose == "steer"
         return f"{asked} {LAST_ROUND}" if last else asked
     if view.result:
-        values = minus(values_in_words(view.result.values, view.objectives, formats_of(view)))
+        values = minus(values_in_words(view.result.values, writers_of(view)))
         return f"The result is policy {view.result.id}: {values}"
     if view.problem:
         then = GOING_ON_FAILS if view.for_good else PUT_RIGHT
@@ -154,8 +154,8 @@ def ranges(view: View) -> list[str]:
     """Return the worst and the best value of each objective on the front; nothing without a front."""
     if not view.front:
         return [""] * len(view.objectives)
-    each = zip(view.values.min(axis=0), view.values.max(axis=0), formats_of(view), strict=True)
-    return [minus(f"{low:{fmt}} to {high:{fmt}}") for low, high, fmt in each]
+    each = zip(writers_of(view), view.values.min(axis=0), view.values.max(axis=0), strict=True)
+    return [minus(writer.span(worst, best)) for writer, worst, best in each]
 
 
 def limits_reached(view: View, selection: Selection) -> str:
@@ -182,7 +182,7 @@ def end_with(view: View, selection: Selection, policy: Policy) -> str:
     """Name a way to end the run: with which policy, by letter, number and scores."""
     letter = selection.letters.get(policy.id)
     name = f"{letter}, policy {policy.id}" if letter else f"policy {policy.id}"
-    return f"End with {name}: {minus(values_in_words(policy.values, view.objectives, formats_of(view)))}"
+    return f"End with {name}: {minus(values_in_words(policy.values, writers_of(view)))}"
 
 
 def standing(view: View, policy: Policy) -> str:
@@ -200,9 +200,11 @@ def beside(view: View, selection: Selection, policy: Policy) -> str:
     first = view.policy(selection.places.get(LETTERS[0], -1))
     if first is None or first.id == policy.id:
         return ""
-    each = zip(view.objectives, policy.values - first.values, formats_of(view), strict=True)
-    found = [(f"{abs(change):{fmt}}", change > 0, objective.label) for objective, change, fmt in each]
-    told = [f"{label} {amount} {'better' if better else 'worse'}" for amount, better, label in found if float(amount)]
+    told = [
+        f"{writer.objective.label} {writer.size(change)} {'better' if change > 0 else 'worse'}"
+        for writer, change in zip(writers_of(view), policy.values - first.values, strict=True)
+        if float(writer.size(change))
+    ]
     return f"Beside A: {', '.join(told) or 'the same'}"
 
 
@@ -226,8 +228,8 @@ def blend_name(selection: Selection, pair: tuple[int, int], per_cent: int) -> st
 
 def blend_scores(view: View, score: BlendScore) -> str:
     """Return the scores of a blend in one line, as those of a policy."""
-    each = zip(view.objectives, score.mean, score.std, formats_of(view), strict=True)
-    found = [minus(f"{o.label} {value:{fmt}} ±{std:{fmt}} {o.unit}") for o, value, std, fmt in each]
+    each = zip(view.objectives, _with_units(view, score.mean, score.std), strict=True)
+    found = [f"{objective.label} {text}" for objective, text in each]
     return f"{', '.join(found)}, over {plural(EPISODES, 'episode')}"
 
 
@@ -235,21 +237,28 @@ def raw_returns(view: View, policy: Policy) -> str:
     """Return the mean undiscounted returns of a policy; nothing where they are its scores."""
     if policy.raw is None:
         return ""
-    formats = [number_format(np.array([value])) for value in policy.raw]
-    return "raw returns: " + minus(values_in_words(policy.raw, view.objectives, formats))
+    return "raw returns: " + minus(values_in_words(policy.raw, writers_for(policy.raw[None], view.objectives)))
 
 
 @lru_cache(maxsize=4)
-def formats_of(view: View) -> list[str]:
-    """Return the number format of each objective, fit for the front; for zeros where there is no front."""
-    values = view.values if view.front else np.zeros((1, len(view.objectives)))
-    return [number_format(column) for column in values.T]
+def writers_of(view: View) -> list[Writer]:
+    """Return a writer of each objective, fit for the front; for zeros where there is no front."""
+    return writers_for(view.values if view.front else np.zeros((1, len(view.objectives))), view.objectives)
+
+
+def decimals(view: View) -> list[int | None]:
+    """Return the digits after the point of each objective's scores; None: significant digits, as needed."""
+    return [int(writer.format[1:-1]) if writer.format.endswith("f") else None for writer in writers_of(view)]
 
 
 def score_of_each(view: View, policy: Policy) -> list[str]:
-    """Return `−66.1 ±0.4 -steps` for each objective: mean and standard deviation over the evaluation episodes."""
-    each = zip(view.objectives, policy.values, policy.std, formats_of(view), strict=True)
-    return [minus(f"{value:{fmt}} ±{std:{fmt}}") + f" {o.unit}" for o, value, std, fmt in each]
+    """Return `66.1 ±0.4 steps` for each objective: mean and standard deviation over the evaluation episodes."""
+    return _with_units(view, policy.values, policy.std)
+
+
+def _with_units(view: View, values: np.ndarray, deviations: np.ndarray) -> list[str]:
+    each = zip(writers_of(view), values, deviations, strict=True)
+    return [minus(writer.score(*score)) + f" {writer.objective.read.unit}" for writer, *score in each]
 
 
 def remark(view: View, policy: Policy) -> str:
@@ -270,13 +279,12 @@ def outlook(view: View, selection: Selection) -> str:
     prospect = selection.prospect
     if prospect is None:
         return f"{letter} …"
-    formats = formats_of(view)
     kept = int(prospect.kept.sum())
     narrows = f"{letter} the search narrows to the dashed area, with {kept} of {plural(len(prospect.kept), 'policy')}."
     if not len(prospect.expected):
         return f"{narrows} Nothing new is expected there."
     best = dict.fromkeys(prospect.expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
-    points = [minus(values_in_words(prospect.expected[row], view.objectives, formats)) for row in best]
+    points = [minus(values_in_words(prospect.expected[row], writers_of(view))) for row in best]
     odds = f"{10 * prospect.odds:.0f} of 10 such forecasts come true."
     return f"{narrows} It may find {'; or '.join(points[:MOST_POINTS])}. {odds}"
 
@@ -286,11 +294,6 @@ def _certainty(view: View, policy: Policy) -> str:
     if policy.confirmation:
         return f"{outside}Scores from {plural(policy.confirmation.episodes, 'fresh episode')}."
     return f"{outside}Scores from the search: the best of many, they may be lucky."
-
-
-def minus(text: str) -> str:
-    """Write numbers with the sign for minus that is as wide as a digit."""
-    return re.sub(r"(?<!\w)-(?=\d)", "−", text)
 
 
 def _generation(timeline: Timeline) -> int:

@@ -117,10 +117,10 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
         ("12 go -3", "Say for how many rounds"),
         ("12 go x", "Say for how many rounds"),
         ("99 go 5", "There is no policy 99"),
-        ("more", "More of what? Name one of the objectives: 1 time, 2 fuel. For example: more time"),
-        ("more speed", "More of what?"),
-        ("more 0", "More of what?"),
-        ("more 3", "More of what?"),
+        ("best", "Best in what? Name one of the objectives: 1 time, 2 fuel. For example: best time"),
+        ("best speed", "Best in what?"),
+        ("best 0", "Best in what?"),
+        ("best 3", "Best in what?"),
     ],
 )
 def test_mistakes_are_explained_and_asked_again(ask, line, sentence):
@@ -175,7 +175,7 @@ def test_help(ask, line):
         "  12 4 9       prefer policy 12, then 4, then 9, to all others\n",
         "  same         no difference between these\n",
         "  limit fuel -40\n               rule out what does not reach this; none takes it back\n",
-        "  more fuel    list the policies with the most of an objective first\n",
+        "  best fuel    list the policies that are best in an objective first\n",
         "  12 go 5      choose policy 12, then no question for 5 rounds (or go 5)\n",
         "  12 q         choose policy 12 and end (q or Ctrl-D: with the last choice)\n",
     ):
@@ -201,8 +201,8 @@ def order_shown(session: Session) -> list[list[str]]:
     return [[row.split()[0] for row in rows] for rows in tables_shown(session)]
 
 
-@pytest.mark.parametrize("line", ["more fuel", "more 2", "more f", "more FUEL LABEL"])
-def test_more_lists_the_front_by_that_objective(ask, line):
+@pytest.mark.parametrize("line", ["best fuel", "best 2", "best f", "best FUEL LABEL"])
+def test_best_lists_the_front_by_that_objective(ask, line):
     session = Session(line, "10")
     session.user.answer(ask(VALUES))
     assert order_shown(session) == [["11", "10", "12"], ["12", "10", "11"]]
@@ -289,9 +289,9 @@ def test_the_heading_says_what_is_asked(ask, purpose, form, again, heading):
 def test_an_ambiguous_objective_is_asked_for_again(ask):
     question = ask([[1, 2], [2, 1]])
     objectives = (Objective("speed x", "speed x", "m"), Objective("speed y", "speed y", "m"))
-    session = Session("more speed", "more speed y", "10")
+    session = Session("best speed", "best speed y", "10")
     session.user.answer(type(question)("steer", 1, objectives, question.front, question.bounds, None))
-    assert "More of what? Name one of the objectives: 1 speed x, 2 speed y" in session.sentences
+    assert "Best in what? Name one of the objectives: 1 speed x, 2 speed y" in session.sentences
     assert order_shown(session) == [["11", "10"], ["10", "11"]]
 
 

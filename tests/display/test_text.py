@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from envs.core import Objective
-from jmorl.display.text import duration, number, number_format, plural, short_count, values_in_words
+from jmorl.display.text import duration, number, number_format, plural, short_count
 
 
 @given(st.floats(1e-4, 1e7), st.integers(2, 5), st.floats(-1e3, 1e3))
@@ -90,8 +89,3 @@ def test_durations(seconds, text):
 
 def test_plurals():
     assert [plural(1, "policy"), plural(2, "policy"), plural(0, "step")] == ["1 policy", "2 policies", "0 steps"]
-
-
-def test_values_in_words():
-    objectives = (Objective("time", "time", "-steps"), Objective("fuel", "fuel used", "-litres"))
-    assert values_in_words([-66.04, -7.0], objectives, [".1f", ".2f"], "≥ ") == "time ≥ -66.0, fuel used ≥ -7.00"

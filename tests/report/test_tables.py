@@ -104,7 +104,7 @@ def test_a_row_for_every_decision(make_run):
         ({"generations": 3}, "go on for 3 generations"),
         ({"equal": True}, "no difference"),
         ({"ranking": (2, 1)}, "in the order 2 1"),
-        ({"limits": (None, -45.0)}, "limits none -45"),
+        ({"limits": (None, -45.0)}, "limits: fuel ≥ -45.0"),
         ({"stand_in": True}, "by the stand-in"),
         ({}, ""),
     ],

@@ -54,6 +54,19 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         tab.page.get_by_text(re.compile("If you choose .: the search narrows")).wait_for()
         tab.card(policies[1]).locator(".totals dd").first.wait_for()
         tab.screenshot("2-question")
+
+        # Numbers are as people say them: of steps, less is better.
+        score = tab.card(policies[1]).locator(".scores dd").first.inner_text()
+        assert re.fullmatch(r"\d+\.\d+ ±\d+\.\d+ steps", score), score
+        times = [tab.value(row) for row in range(tab.rows().count())]
+        assert times == sorted(times) and times[0] > 0
+        tab.tab("Limits")
+        tab.page.get_by_label("time (steps), at most").fill(str(times[0] + 0.5))
+        tab.page.get_by_text(re.compile(f"1 of {len(times)} .* your limits")).wait_for()
+        tab.screenshot("2-limits")
+        tab.page.get_by_label("time (steps), at most").fill("")
+        tab.page.get_by_text(re.compile(f"{len(times)} of {len(times)} .* your limits")).wait_for()
+        tab.tab("Policies")
         tab.card(policies[1]).get_by_role("button", name="Choose").click()
         tab.page.get_by_text(re.compile("Training round 1|Round 2: which")).first.wait_for()
         tab.screenshot("3-training")

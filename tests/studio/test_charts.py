@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from envs.core import Objective
+from envs.core import Objective, Reading
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
 from jmorl.methods.base import Prospect
@@ -48,6 +48,24 @@ def view():
 
 def series(options):
     return {each["name"]: each for each in options["series"]}
+
+
+def test_numbers_are_as_people_say_them(view):
+    """Points stay where their returns are, so that the better is to the right and above; only the numbers differ."""
+    time = replace(view.objectives[0], reading=Reading("steps", less_is_better=True))
+    height = replace(view.objectives[1], reading=Reading("m", mean_over=10))
+    read = replace(view, objectives=(time, height))
+    values = np.array([*VALUES.values()])
+    options, plain_options = (front_options(each, (0, 1), None) for each in (read, view))
+    assert series(options)["within the bounds"]["data"] == series(plain_options)["within the bounds"]["data"]
+    assert options["xAxis"]["name"] == "time (steps), better →" and options["xAxis"]["max"] > -60
+    ticks = [options[axis]["axisLabel"][":formatter"] for axis in ("xAxis", "yAxis")]
+    assert "v * -1.0 + 0" in ticks[0] and "v * 0.1 + 0" in ticks[1]
+    assert texts.score_of_each(read, view.front[0])[0] == f"{-VALUES[view.front[0].id][0]:.1f} ±0.5 steps"
+    assert texts.ranges(read)[0] == f"{-values[:, 0].min():.1f} to {-values[:, 0].max():.1f}"
+    assert texts.heading(replace(read, question=None, timeline=None, result=view.front[0]), Selection()).endswith(
+        texts.end_with(read, Selection(), view.front[0]).split(": ")[1]
+    )
 
 
 def test_a_point_is_where_its_values_are_and_on_the_right_side_of_the_bounds(view):
@@ -187,7 +205,8 @@ def test_scores_in_other_units_have_the_raw_returns_beside_them(view):
 
 def test_lines_say_which_policy_they_are(view):
     formatter = series(parallel_options(view))["within the bounds"]["tooltip"][":formatter"]
-    assert '["time (-steps)", "<b>fuel</b> (-J)"]' in formatter and "p.data[names.length]" in formatter
+    assert '[["time (-steps)", 1.0], ["<b>fuel</b> (-J)", 1.0]]' in formatter
+    assert "p.data[objectives.length]" in formatter
 
 
 def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):

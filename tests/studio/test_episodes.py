@@ -23,7 +23,8 @@ def test_an_episode_has_every_step_and_says_once_what_does_not_move(tmp_path):
         assert len(episode["still"]) + len(frame["shapes"]) == len(scene["shapes"])
         kinds = [shape["kind"] for shape in (*episode["still"], *frame["shapes"])]
         assert kinds == [shape["kind"] for shape in scene["shapes"]]
-        np.testing.assert_allclose(frame["totals"], recording.totals[frame["step"]], atol=1e-4)
+        # Steps and fuel, of which people say how many: less is better.
+        np.testing.assert_allclose(frame["totals"], -recording.totals[frame["step"]], atol=1e-4)
     assert episode["still"] and len(episode["frames"][0]["shapes"]) == 3  # the car
 
 

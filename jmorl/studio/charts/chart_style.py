@@ -1,11 +1,13 @@
 """The common style of the charts: colours that colour-blind people can tell apart, text, tooltips, numbers."""
 
+import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from envs.core import Objective
-from jmorl.display.text import number_format, objective_label
+from jmorl.display.readings import reading_label
 from jmorl.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, RED
 
 __all__ = ["BLUE", "GREEN", "GREY", "INK", "ORANGE", "PALE", "RED"]
@@ -15,20 +17,22 @@ TEXT = {"fontFamily": "Roboto, sans-serif", "fontSize": 11, "color": INK}
 # Text that is drawn, not HTML: nothing that a name holds is markup. Of points [policy, values..., note].
 TOOLTIP_TEXT = """
 (p) => {
-  const names = %s;
-  const number = (v) => v.toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
-  const values = names.map((name, i) => `${name}  ${number(p.value[i + 1])}`);
-  return [`policy ${p.value[0]}`, ...values, p.value[names.length + 1]].filter(Boolean).join("\\n");
+  const objectives = %s;
+  const number = (v) => (v + 0).toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
+  const values = objectives.map(([label, scale], i) => `${label}  ${number(p.value[i + 1] * scale)}`);
+  return [`policy ${p.value[0]}`, ...values, p.value[objectives.length + 1]].filter(Boolean).join("\\n");
 }
 """
 # The same for lines of parallel coordinates, [values..., policy].
 LINE_TOOLTIP = """
 (p) => {
-  const names = %s;
-  const number = (v) => v.toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
-  return [`policy ${p.data[names.length]}`, ...names.map((name, i) => `${name}  ${number(p.data[i])}`)].join("\\n");
+  const objectives = %s;
+  const number = (v) => (v + 0).toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
+  const values = objectives.map(([label, scale], i) => `${label}  ${number(p.data[i] * scale)}`);
+  return [`policy ${p.data[objectives.length]}`, ...values].join("\\n");
 }
 """
+TICK = '(v) => (v * %r + 0).toLocaleString("en", { maximumFractionDigits: 6 }).replace("-", "−")'
 
 
 def base() -> dict[str, Any]:
@@ -38,13 +42,17 @@ def base() -> dict[str, Any]:
 
 def better(objective: Objective) -> str:
     """Return the title of an axis: quantity, unit and direction."""
-    return f"{objective_label(objective)}, better →"
+    return f"{reading_label(objective)}, better →"
 
 
-def decimals(values: np.ndarray) -> list[int | None]:
-    """Return the digits after the point for each objective of `values` [N, M]; None: significant digits, as needed."""
-    formats = [number_format(column) for column in values.T]
-    return [int(fmt[1:-1]) if fmt.endswith("f") else None for fmt in formats]
+def read_ticks(objective: Objective) -> dict[str, str]:
+    """Return what writes the numbers along an axis of returns as people say them."""
+    return {":formatter": TICK % objective.read.scale}
+
+
+def tooltip(text: str, objectives: Sequence[Objective]) -> dict[str, str]:
+    """Return what writes a tooltip: TOOLTIP_TEXT or LINE_TOOLTIP, for these objectives."""
+    return {":formatter": text % json.dumps([(reading_label(each), each.read.scale) for each in objectives])}
 
 
 def plain(values: np.ndarray) -> list[Any]:

@@ -1,6 +1,5 @@
 """The front as points in two of its objectives, with its bounds, earlier fronts, choices and expectations."""
 
-import json
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion
 from jmorl.display.limits import around, inside
-from jmorl.display.text import number, objective_label
+from jmorl.display.text import minus, number
 from jmorl.methods.base import Prospect
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
@@ -26,6 +25,8 @@ from jmorl.studio.charts.chart_style import (
     base,
     better,
     plain,
+    read_ticks,
+    tooltip,
 )
 from jmorl.studio.selection import Selection, wanted
 from jmorl.studio.view import View
@@ -77,7 +78,7 @@ def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: 
 def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
     """Return the options that give both charts the same coordinates: no label may move or shrink their grids."""
     visible = visible and bool(view.front)
-    digits = max(len(f"{value:,.4g}") for value in limits[:, axes[1]])
+    digits = max(len(f"{value:,.4g}") for value in view.objectives[axes[1]].read.of(limits[:, axes[1]]))
     room = max(36, DIGIT * digits)  # for the numbers at the left
     x, y = (
         _axis(view.objectives[axis], limits[:, axis], gap, visible)
@@ -115,7 +116,13 @@ def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> 
         "min": low,
         "max": high,
         "nameTruncate": {"maxWidth": LONGEST_NAME},
-        "axisLabel": {**TEXT, "showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
+        "axisLabel": {
+            **TEXT,
+            **read_ticks(objective),
+            "showMinLabel": False,
+            "showMaxLabel": False,
+            "hideOverlap": True,
+        },
         "axisLine": {"onZero": False, "lineStyle": {"color": GREY}},
         "splitLine": {"lineStyle": {"color": "#ececec"}},
         "splitNumber": 5,
@@ -149,7 +156,7 @@ def _members(view: View, axes: tuple[int, int], limits: np.ndarray, within_bound
         "within the bounds" if within_bounds else "outside the bounds",
         data,
         axes,
-        tooltip=_tooltip(view),
+        tooltip=tooltip(TOOLTIP_TEXT, view.objectives),
         symbolSize=(9 if within_bounds else 7) if len(view.front) <= MANY else 5,
         itemStyle=style,
         emphasis={"scale": 1.6},
@@ -164,7 +171,7 @@ def _far_out(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str,
     for policy in (view.front[row] for row in np.flatnonzero(outside)):
         beyond = [int(np.sign(policy.values[axis] - np.clip(policy.values[axis], *limits[:, axis]))) for axis in axes]
         told = [
-            f"{view.objectives[axis].label} {number(float(policy.values[axis]))}".replace("-", "−")
+            minus(f"{view.objectives[axis].label} {number(float(view.objectives[axis].read.of(policy.values[axis])))}")
             for axis, side in zip(axes, beyond, strict=True)
             if side
         ]
@@ -181,7 +188,7 @@ def _far_out(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str,
         data,
         axes,
         encode=_clipped_encode(view),
-        tooltip=_tooltip(view),
+        tooltip=tooltip(TOOLTIP_TEXT, view.objectives),
         symbol="arrow",
         symbolSize=13,
         itemStyle={"color": BLUE, "borderColor": "#ffffff"},
@@ -206,10 +213,6 @@ def _clipped(policy: Policy, axes: tuple[int, int], limits: np.ndarray, note: st
 def _clipped_encode(view: View) -> dict[str, int]:
     """Return where `_clipped` has the place of a point."""
     return {"x": len(view.objectives) + 2, "y": len(view.objectives) + 3}
-
-
-def _tooltip(view: View) -> dict[str, str]:
-    return {":formatter": TOOLTIP_TEXT % json.dumps([objective_label(each) for each in view.objectives])}
 
 
 def _ghosts(view: View, axes: tuple[int, int]) -> dict[str, Any]:

@@ -1,12 +1,11 @@
 """The front as lines across an axis for each objective, a line for each policy."""
 
-import json
 from typing import Any
 
 import numpy as np
 
 from jmorl.display.limits import around
-from jmorl.display.text import objective_label
+from jmorl.display.readings import reading_label
 from jmorl.search.bounds import within
 from jmorl.studio.charts.chart_style import (
     BLUE,
@@ -19,6 +18,8 @@ from jmorl.studio.charts.chart_style import (
     TEXT,
     base,
     plain,
+    read_ticks,
+    tooltip,
 )
 from jmorl.studio.selection import Selection
 from jmorl.studio.view import View
@@ -70,13 +71,17 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
     axes = [
         {
             "dim": index,
-            "name": f"↑ {objective_label(objective)}" if visible else "",
+            "name": f"↑ {reading_label(objective)}" if visible else "",
             "nameTextStyle": TEXT,
             "nameGap": 12,
             "min": float(low),
             "max": float(high),
             # The first axis has its numbers on its left, where no lines are.
-            "axisLabel": {**text, "margin": -8, "align": "right"} if index == 0 else {**text, "margin": 8},
+            "axisLabel": {
+                **text,
+                **read_ticks(objective),
+                **({"margin": -8, "align": "right"} if index == 0 else {"margin": 8}),
+            },
             "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
             "axisTick": {"show": visible, "length": -5 if index == 0 else 5},
         }
@@ -105,8 +110,7 @@ def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, An
     ]
     opacity = min(0.7, 60 / max(len(view.front), 1))  # of many lines one still sees where most are
     style = {"color": colour, "width": 1.2, "opacity": opacity}
-    tooltip = {":formatter": LINE_TOOLTIP % json.dumps([objective_label(each) for each in view.objectives])}
-    return _series(name, data, lineStyle=style, tooltip=tooltip, z=2)
+    return _series(name, data, lineStyle=style, tooltip=tooltip(LINE_TOOLTIP, view.objectives), z=2)
 
 
 def _bounds(view: View) -> dict[str, Any]:

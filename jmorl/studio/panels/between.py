@@ -5,7 +5,6 @@ from nicegui.events import GenericEventArguments
 
 from jmorl.studio import texts
 from jmorl.studio.between import BEYOND
-from jmorl.studio.charts.chart_style import decimals
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.panels.player import Player
 from jmorl.studio.tab import Tab
@@ -74,7 +73,7 @@ class BetweenPanel:
         assert self.place is not None
         view = self.tab.view
         self._name()
-        digits = decimals(view.values) if view.front else [2] * len(view.objectives)
+        digits = texts.decimals(view)
         self.player.props["src"] = self._address
         self.player.props["objectives"] = [f"{each.label} so far" for each in view.objectives]
         self.player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]

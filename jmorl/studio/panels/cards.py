@@ -4,7 +4,6 @@ from nicegui import ui
 
 from jmorl.search.policy import Policy
 from jmorl.studio import texts
-from jmorl.studio.charts.chart_style import decimals
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.panels.player import Player
 from jmorl.studio.selection import LETTERS
@@ -68,7 +67,7 @@ class Card:
             )
         self.standing = ui.label().classes("standing")
         player = Player()
-        digits = decimals(view.values) if view.front else [2] * len(view.objectives)
+        digits = texts.decimals(view)
         player.props["src"] = f"/episodes/{view.run}/{policy.id}"
         player.props["objectives"] = [f"{each.label} so far" for each in view.objectives]
         player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]

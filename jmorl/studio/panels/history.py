@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from nicegui import ui
 
 from jmorl.decision.records import DecisionRecord
-from jmorl.display.text import plural, values_in_words
+from jmorl.display.readings import values_in_words
+from jmorl.display.text import plural
 from jmorl.studio import texts
 from jmorl.studio.history import Branch
 from jmorl.studio.panels.panel import Shown
@@ -80,7 +81,7 @@ class HistoryPanel:
 
     def _values(self, values: Sequence[float]) -> str:
         view = self.tab.view
-        return texts.minus(values_in_words(values, view.objectives, texts.formats_of(view)))
+        return texts.minus(values_in_words(values, texts.writers_of(view)))
 
 
 def _open_question(view: View) -> str:

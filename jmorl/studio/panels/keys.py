@@ -3,7 +3,7 @@
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
-from jmorl.display.text import objective_label
+from jmorl.display.readings import reading_label
 from jmorl.studio import texts
 from jmorl.studio.tab import Tab
 
@@ -23,7 +23,7 @@ class Keys:
                     with ui.element("dd"):
                         ui.label(what)
             for number, objective in enumerate(tab.view.objectives, start=1):
-                ui.label(f"{number}: {objective_label(objective)}")
+                ui.label(f"{number}: {reading_label(objective)}")
             ui.button("Close", on_click=self.list.close).props("flat no-caps")
         ui.button("Keys", on_click=self.list.open).props("flat dense no-caps size=sm")
 

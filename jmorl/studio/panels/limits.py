@@ -4,7 +4,7 @@ import math
 
 from nicegui import ui
 
-from jmorl.display.text import objective_label
+from jmorl.display.readings import reading_label
 from jmorl.studio import texts
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
@@ -31,20 +31,22 @@ class LimitsPanel:
             return
         limits = selection.limits or (-math.inf,) * len(view.objectives)
         self.showing = True
-        for number, least in zip(self.numbers, limits, strict=True):
-            number.set_value(least if math.isfinite(least) else None)
+        for number, objective, least in zip(self.numbers, view.objectives, limits, strict=True):
+            number.set_value(float(objective.read.of(least)) if math.isfinite(least) else None)
         self.showing = False
         for label, told in zip(self.ranges, texts.ranges(view), strict=True):
             label.set_text(told)
         self.reached.set_text(texts.limits_reached(view, selection))
 
     def _add_row(self, index: int) -> tuple[ui.number, ui.label]:
-        name = objective_label(self.tab.view.objectives[index])
+        objective = self.tab.view.objectives[index]
+        name = f"{reading_label(objective)}, at {'most' if objective.read.less_is_better else 'least'}"
         ui.label(name)
         number = ui.number(on_change=lambda event: self._set(index, event.value)).classes("limit")
-        number.props(f'dense outlined clearable debounce=400 placeholder="anything" aria-label="at least, in {name}"')
+        number.props('dense outlined clearable debounce=400 placeholder="anything"').props["aria-label"] = name
         return number, ui.label().classes("point-side")
 
     def _set(self, index: int, value: float | None) -> None:
         if not self.showing:
-            self.tab.limit(index, value)
+            objective = self.tab.view.objectives[index]
+            self.tab.limit(index, None if value is None else objective.read.to_return(value))

@@ -5,7 +5,8 @@ from nicegui import ui
 from jmorl.decision.answers import Adjust, Back, Choose
 from jmorl.decision.enautilus import IntermediatePoint
 from jmorl.decision.protocol import PointQuestion
-from jmorl.display.text import objective_label, plural
+from jmorl.display.readings import reading_label
+from jmorl.display.text import plural
 from jmorl.search.scaling import range_scale
 from jmorl.studio import texts
 from jmorl.studio.dialogue import Dialogue
@@ -71,18 +72,17 @@ class NavigationPanel:
             ui.button("Close", on_click=self.tab.close_dialogue).props("no-caps dense flat")
 
     def _add_point(self, dialogue: Dialogue, question: PointQuestion, number: int, point: IntermediatePoint) -> None:
-        scale, formats = range_scale(question.state.values), texts.formats_of(self.tab.view)
+        scale, writers = range_scale(question.state.values), texts.writers_of(self.tab.view)
         worst, best = scale.apply(point.value), scale.apply(point.best)
         with ui.element("div").classes("point"):
             ui.label(str(number)).classes("point-number")
             with ui.element("div").classes("point-ranges"):
                 for index, objective in enumerate(question.objectives):
-                    fmt = formats[index]
-                    ui.label(objective_label(objective)).classes("point-objective")
+                    ui.label(reading_label(objective)).classes("point-objective")
                     with ui.element("div").classes("range").props('aria-hidden="true"'):
                         width = max(100 * (best[index] - worst[index]), 1.5)
                         ui.element("div").style(f"left: {100 * worst[index]:.1f}%; width: {width:.1f}%")
-                    ui.label(texts.minus(f"{point.value[index]:{fmt}} to {point.best[index]:{fmt}}"))
+                    ui.label(texts.minus(writers[index].span(point.value[index], point.best[index])))
             with ui.element("div").classes("point-side"):
                 ui.label(f"{point.closeness:.0f} % of the way")
                 ui.label(f"{plural(int(point.reachable.sum()), 'policy')} left")

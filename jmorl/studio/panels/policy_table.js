@@ -1,6 +1,7 @@
 // A sortable table of policies that stays fast with thousands: only the rows in sight are in the document.
 //
-// Rows are [id, outside, cell, cell, ...]: `outside` says that the row lies outside the bounds.
+// Rows are [id, outside, cell, cell, ...]: `outside` says that the row lies outside the bounds. Values are returns,
+// sorted as such, the best first; a column's `scale` turns them into what people say.
 const HEIGHT = 26; // pixels of a row, as in studio.css
 const SPARE = 8; // rows above and below those in sight
 
@@ -51,10 +52,10 @@ export default {
   methods: {
     value: (row, column) => (column ? row[column + 1] : row[0]),
     text(row, index) {
-      const { decimals, std } = this.columns[index];
+      const { decimals, std, scale } = this.columns[index];
       if (decimals === undefined) return String(this.value(row, index));
-      const value = this.value(row, index).toFixed(decimals).replace("-", "−");
-      return std === undefined ? value : `${value} ±${row[std].toFixed(decimals)}`;
+      const write = (value) => (Number((value * scale).toFixed(decimals)) + 0).toFixed(decimals).replace("-", "−");
+      return `${write(this.value(row, index))} ±${write(Math.abs(row[std]) * Math.sign(scale))}`;
     },
     classes(row) {
       return { "policies-row": true, outside: row[1], focus: row[0] === this.focus };

@@ -4,9 +4,10 @@ from typing import Any
 
 from nicegui.element import Element
 
-from jmorl.display.text import objective_label
+from jmorl.display.readings import direction, reading_label
 from jmorl.search.bounds import within
-from jmorl.studio.charts.chart_style import decimals, plain
+from jmorl.studio import texts
+from jmorl.studio.charts.chart_style import plain
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.selection import listed
 from jmorl.studio.tab import Tab
@@ -51,15 +52,16 @@ class PolicyTable:
     def _columns(self) -> list[dict[str, Any]]:
         view = self.tab.view
         count = len(view.objectives)
-        digits = decimals(view.values) if view.front else [2] * count
         values = [
             {
                 "label": objective.label,
-                "hint": f"{objective_label(objective)}, mean and standard deviation over the evaluation episodes",
+                "hint": f"{reading_label(objective)}, {direction(objective)}: mean and standard deviation over the "
+                "evaluation episodes",
+                "scale": objective.read.scale,
                 "decimals": 2 if places is None else places,
                 "std": index + count + 3,
             }
-            for index, (objective, places) in enumerate(zip(view.objectives, digits, strict=True))
+            for index, (objective, places) in enumerate(zip(view.objectives, texts.decimals(view), strict=True))
         ]
         return [
             {"label": "policy", "hint": "number of the policy"},
