@@ -17,6 +17,7 @@ from jmorl.studio.panels.history import HistoryPanel
 from jmorl.studio.panels.introduction import Introduction
 from jmorl.studio.panels.keys import Keys
 from jmorl.studio.panels.limits import LimitsPanel
+from jmorl.studio.panels.lost import Lost
 from jmorl.studio.panels.navigation import NavigationPanel
 from jmorl.studio.panels.panel import Panel
 from jmorl.studio.panels.parallel import ParallelPanel
@@ -48,9 +49,10 @@ class Page:
         ui.add_css(STYLE)
         ui.colors(primary=BLUE, negative=DARK_RED)
         ui.dark_mode(None)  # as the browser has it
+        self.panels: list[Panel] = [Lost(tab)]
         with ui.element("div").classes("studio") as self.root:
             with ui.element("header").classes("bar"):
-                self.panels: list[Panel] = [Header(tab)]
+                self.panels.append(Header(tab))
                 Keys(tab)
             with ui.element("div").classes("top"):
                 self.panels += [Introduction(tab), QuestionBar(tab), EndingDialog(tab)]

@@ -31,6 +31,7 @@ from jmorl.studio.episodes import episode_json
 from jmorl.studio.guard import Guard
 from jmorl.studio.page import Page
 from jmorl.studio.panels.introduction import REMEMBERED
+from jmorl.studio.panels.lost import SWITCHED_OFF
 from jmorl.studio.session import Session
 
 ICON = (
@@ -67,7 +68,7 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
 
     @ui.page("/")
     async def page() -> None:
-        ui.add_head_html(f"{ENGLISH}{REMEMBERED}")
+        ui.add_head_html(f"{ENGLISH}{REMEMBERED}{SWITCHED_OFF}")
         client = ui.context.client
         await client.connected()  # before that the browser's tab is not known
         if client.has_socket_connection:  # and after that it may be closed again

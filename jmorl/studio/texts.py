@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from jmorl.display.commands import command
 from jmorl.display.readings import Writer, values_in_words, writers_for
 from jmorl.display.text import duration, front_question, minus, plural, short_count
 from jmorl.report.timeline import Timeline
@@ -42,6 +43,10 @@ TRAIN_ON_HINT = "A new branch goes on where this run ended. This run and its res
 END_TITLE = "End the run?"
 END_EXPLANATION = "The policy becomes the result. You can step back in the history or train on at any time."
 END_LATER = "The run ends when this round is over."
+LOST = (
+    "The studio does not answer: nothing that you press counts now. What the run has is kept. This page goes on by itself"
+    " as soon as the studio is there again. If it was ended, start it again: {command}"
+)
 LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
 SCORING = "Scoring …"
@@ -142,6 +147,11 @@ def heading(view: View, selection: Selection) -> str:
     if view.rounds_to_question > 1:
         return f"You are asked again in {view.rounds_to_question} rounds."
     return "You are asked when this round is over."
+
+
+def lost(view: View) -> str:
+    """Say that the studio is gone, and what to do."""
+    return LOST.format(command=command("studio", view.path))
 
 
 def introduction(view: View) -> str:

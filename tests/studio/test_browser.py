@@ -173,6 +173,12 @@ def test_a_question_outlives_a_reload_a_closed_tab_and_a_killed_server(browser, 
         shown = tab.policies()
         tab.lost()
         studio.kill()
+        # One message says so; nothing can be pressed, by keys either.
+        tab.page.get_by_text("The studio does not answer").wait_for()
+        assert str(path) in tab.page.get_by_role("alert").inner_text()
+        assert tab.page.locator(".studio[inert]").count() and not tab.page.get_by_text("Connection lost").is_visible()
+        tab.screenshot("15-lost")
+        tab.page.keyboard.press("c")
         assert not (path / "decisions.jsonl").exists()
     with Served(path, port=port) as studio:
         tab.found_again()
