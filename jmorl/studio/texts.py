@@ -44,8 +44,8 @@ END_TITLE = "End the run?"
 END_EXPLANATION = "The policy becomes the result. You can step back in the history or train on at any time."
 END_LATER = "The run ends when this round is over."
 LOST = (
-    "The studio does not answer: nothing that you press counts now. What the run has is kept. This page goes on by itself"
-    " as soon as the studio is there again. If it was ended, start it again: {command}"
+    "The studio does not answer: nothing that you press counts now. What the run has is kept. This page goes on by "
+    "itself as soon as the studio is there again. If it was ended, start it again: {command}"
 )
 LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
