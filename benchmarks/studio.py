@@ -70,11 +70,11 @@ SERVED = ("alone", "served", "with a page", "with a policy playing")
 class Still(Session):
     """A session at a question about many policies, of a run that there is not."""
 
-    def __init__(self, policies: int, objectives: int):
+    def __init__(self, policies: int, objectives: int, label: str):
         super().__init__()
         config = resolve(overrides={"env": "mo-halfcheetah-v5", "user": "terminal"})
         names = tuple(
-            replace(config_objective, name=f"o{index}", label=f"objective {index + 1}")
+            replace(config_objective, name=f"o{index}", label=f"{label} {index + 1}")
             for index, config_objective in enumerate([_objective()] * objectives)
         )
         generator = np.random.default_rng(0)
@@ -202,6 +202,8 @@ def main() -> None:
     """Measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", nargs="?", choices=["still"], help="serve a question about many policies, and no more")
+    parser.add_argument("--objectives", type=int, default=3, help="of that question")
+    parser.add_argument("--label", default="objective", help="of these objectives, before their number")
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=PORT)
     options = parser.parse_args()
@@ -209,7 +211,7 @@ def main() -> None:
         from jmorl.studio.server import address, serve
 
         print(f"The studio is at {address(options.host, options.port, None)}", flush=True)
-        serve(Still(POLICIES, 3), options.host, options.port, None)
+        serve(Still(POLICIES, options.objectives, options.label), options.host, options.port, None)
         return
     with tempfile.TemporaryDirectory() as folder:
         clicks, waits, seconds = interaction(), question(Path(folder)), serving(Path(folder))

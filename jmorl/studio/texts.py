@@ -1,6 +1,7 @@
 """The texts of the page."""
 
 from functools import lru_cache
+from itertools import accumulate
 
 import numpy as np
 
@@ -50,7 +51,7 @@ LOST = (
 LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
 SCORING = "Scoring …"
-MOST_POINTS = 3  # that the prediction model is quoted with
+MOST_POINTS, LONGEST_POINTS = 3, 150  # that the prediction model is quoted with, and their characters
 KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
@@ -295,8 +296,9 @@ def outlook(view: View, selection: Selection) -> str:
         return f"{narrows} Nothing new is expected there."
     best = dict.fromkeys(prospect.expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
     points = [minus(values_in_words(prospect.expected[row], writers_of(view))) for row in best]
+    count = max(1, sum(length <= LONGEST_POINTS for length in accumulate(len(point) for point in points[:MOST_POINTS])))
     odds = f"{10 * prospect.odds:.0f} of 10 such forecasts come true."
-    return f"{narrows} It may find {'; or '.join(points[:MOST_POINTS])}. {odds}"
+    return f"{narrows} It may find {'; or '.join(points[:count])}. {odds}"
 
 
 def _certainty(view: View, policy: Policy) -> str:

@@ -325,6 +325,22 @@ def test_a_front_of_thousands_with_three_objectives_can_be_searched(browser):
         assert not tab.problems
 
 
+def test_five_objectives_with_long_labels_have_room(browser):
+    label = "mean force of the carriage's actuator"
+    with Served("--objectives", 5, "--label", label, command=("benchmarks.studio", "still")) as studio:
+        tab = Tab(browser, studio.address)
+        tab.asked(4)
+        tab.page.get_by_role("button", name="Choose A").wait_for()
+        tab.screenshot("16-five-objectives")
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= 1280
+        # All of each button, heading and number can be read: nothing is wider than its place.
+        wider = "(all) => all.filter((each) => each.scrollWidth > each.clientWidth + 1).map((each) => each.textContent)"
+        for read in (".question .q-btn", ".heading", ".policies-head button", ".scores dt", ".scores dd"):
+            assert tab.page.locator(read).evaluate_all(wider) == []
+        assert tab.better_in(f"{label} 5").bounding_box()["width"] > 100
+        assert not tab.problems
+
+
 def test_the_keyboard_is_enough(browser, small, tmp_path):
     path = tmp_path / "run"
     with Served("--out", path, *small) as studio:

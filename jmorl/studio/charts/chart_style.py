@@ -1,7 +1,10 @@
 """The common style of the charts: colours that colour-blind people can tell apart, text, tooltips, numbers."""
 
 import json
+import math
+import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +35,14 @@ LINE_TOOLTIP = """
   return [`policy ${p.data[objectives.length]}`, ...values].join("\\n");
 }
 """
-TICK = '(v) => (v * %r + 0).toLocaleString("en", { maximumFractionDigits: 6 }).replace("-", "−")'
+INTERVALS = 5  # between the numbers along an axis, about
+TICK = """
+(v) => {
+  const [scale, places] = %s;
+  const digits = { minimumFractionDigits: places, maximumFractionDigits: places };
+  return (Number((v * scale).toFixed(places)) + 0).toLocaleString("en", digits).replace("-", "−");
+}
+"""
 
 
 def base() -> dict[str, Any]:
@@ -40,14 +50,17 @@ def base() -> dict[str, Any]:
     return {"animation": False, "textStyle": TEXT, "tooltip": {"renderMode": "richText", "confine": True}}
 
 
-def better(objective: Objective) -> str:
-    """Return the title of an axis: quantity, unit and direction."""
-    return f"{reading_label(objective)}, better →"
+def better(objective: Objective, room: int) -> str:
+    """Return the title of an axis: quantity, unit and direction, the quantity cut to so many characters."""
+    label = textwrap.shorten(objective.label, max(room, 1), placeholder=" …")
+    return f"{reading_label(replace(objective, label=label))}, better →"
 
 
-def read_ticks(objective: Objective) -> dict[str, str]:
-    """Return what writes the numbers along an axis of returns as people say them."""
-    return {":formatter": TICK % objective.read.scale}
+def read_ticks(objective: Objective, low: float, high: float) -> dict[str, str]:
+    """Return what writes numbers along an axis of returns from low to high as people say them, with equal digits."""
+    interval = abs(objective.read.scale) * (high - low) / INTERVALS
+    places = max(-math.floor(math.log10(interval)), 0) if interval > 1e-9 else 9
+    return {":formatter": TICK % [objective.read.scale, min(places, 9)]}
 
 
 def tooltip(text: str, objectives: Sequence[Objective]) -> dict[str, str]:

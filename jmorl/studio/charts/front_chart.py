@@ -17,6 +17,7 @@ from jmorl.studio.charts.chart_style import (
     GREEN,
     GREY,
     INK,
+    INTERVALS,
     LETTER_COLOURS,
     ORANGE,
     PALE,
@@ -36,7 +37,8 @@ GHOSTS = 6  # earlier fronts
 IN_FORCE = {"color": BLUE, "opacity": 0.1, "borderColor": BLUE, "borderWidth": 1}
 PROPOSED = {"color": "transparent", "borderColor": GREEN, "borderWidth": 1.5, "borderType": "dashed", "opacity": 1}
 RULED_OUT = {"color": INK, "opacity": 0.12}
-LONGEST_NAME, DIGIT = 260, 7  # pixels
+LONGEST_LABELS = 50, 14  # characters, to the right and upwards
+DIGIT = 7  # pixels
 MANY = 300  # policies; more are drawn smaller
 
 
@@ -81,8 +83,8 @@ def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool)
     digits = max(len(f"{value:,.4g}") for value in view.objectives[axes[1]].read.of(limits[:, axes[1]]))
     room = max(36, DIGIT * digits)  # for the numbers at the left
     x, y = (
-        _axis(view.objectives[axis], limits[:, axis], gap, visible)
-        for axis, gap in zip(axes, (26, room + 10), strict=True)
+        _axis(view.objectives[axis], limits[:, axis], gap, letters, visible)
+        for axis, gap, letters in zip(axes, (26, room + 10), LONGEST_LABELS, strict=True)
     )
     grid = {"left": room + 26, "right": 18, "top": 14, "bottom": 44, "containLabel": False, "outerBoundsMode": "none"}
     return {**base(), "grid": grid, "xAxis": x, "yAxis": y}
@@ -104,28 +106,27 @@ def _limits(view: View, asked: PointQuestion | None) -> np.ndarray:
     return around(np.concatenate(shown))
 
 
-def _axis(objective: Objective, limits: np.ndarray, gap: int, visible: bool) -> dict[str, Any]:
+def _axis(objective: Objective, limits: np.ndarray, gap: int, letters: int, visible: bool) -> dict[str, Any]:
     low, high = limits.tolist()
     return {
         "type": "value",
         "show": visible,
-        "name": better(objective),
+        "name": better(objective, letters),
         "nameLocation": "middle",
         "nameGap": gap,
         "nameTextStyle": TEXT,
         "min": low,
         "max": high,
-        "nameTruncate": {"maxWidth": LONGEST_NAME},
         "axisLabel": {
             **TEXT,
-            **read_ticks(objective),
+            **read_ticks(objective, low, high),
             "showMinLabel": False,
             "showMaxLabel": False,
             "hideOverlap": True,
         },
         "axisLine": {"onZero": False, "lineStyle": {"color": GREY}},
         "splitLine": {"lineStyle": {"color": "#ececec"}},
-        "splitNumber": 5,
+        "splitNumber": INTERVALS,
     }
 
 

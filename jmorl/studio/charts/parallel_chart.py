@@ -1,5 +1,6 @@
 """The front as lines across an axis for each objective, a line for each policy."""
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ from jmorl.studio.charts.chart_style import (
 )
 from jmorl.studio.selection import Selection
 from jmorl.studio.view import View
+
+LETTERS, SHORTEST = 80, 16  # of names beside each other: in all, and of one in a line at least
+LINE = 12  # pixels
 
 
 def parallel_options(view: View) -> dict[str, Any]:
@@ -68,18 +72,21 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
     limits = _axes_limits(view)
     visible = visible and bool(view.front)
     text = {**TEXT, "color": INK if visible else "transparent", "showMinLabel": False, "showMaxLabel": False}
+    room = max(LETTERS // max(len(view.objectives) - 1, 1), SHORTEST)
+    names = ["\n".join(textwrap.wrap(f"↑ {reading_label(objective)}", room)) for objective in view.objectives]
+    head = 22 + LINE * max(name.count("\n") + 1 for name in names)
     axes = [
         {
             "dim": index,
-            "name": f"↑ {reading_label(objective)}" if visible else "",
-            "nameTextStyle": TEXT,
+            "name": names[index] if visible else "",
+            "nameTextStyle": {**TEXT, "lineHeight": LINE},
             "nameGap": 12,
             "min": float(low),
             "max": float(high),
             # The first axis has its numbers on its left, where no lines are.
             "axisLabel": {
                 **text,
-                **read_ticks(objective),
+                **read_ticks(objective, low, high),
                 **({"margin": -8, "align": "right"} if index == 0 else {"margin": 8}),
             },
             "axisLine": {"show": visible, "lineStyle": {"color": GREY}},
@@ -87,7 +94,7 @@ def _frame(view: View, visible: bool) -> dict[str, Any]:
         }
         for index, (objective, low, high) in enumerate(zip(view.objectives, *limits, strict=True))
     ]
-    return {**base(), "parallel": {"left": 70, "right": 90, "top": 34, "bottom": 14}, "parallelAxis": axes}
+    return {**base(), "parallel": {"left": 70, "right": 90, "top": head, "bottom": 14}, "parallelAxis": axes}
 
 
 def _axes_limits(view: View) -> np.ndarray:

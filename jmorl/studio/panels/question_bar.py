@@ -60,6 +60,7 @@ class QuestionBar:
             pressed = self.tab.selection.more_of == index
             button = ui.button(objective.label, on_click=lambda index=index: self.tab.more_of(index))
             button.props(f"no-caps dense {'unelevated' if pressed else 'outline'} aria-pressed={str(pressed).lower()}")
+            button.classes("objective")
 
     def _add_answers(self) -> None:
         view = self.tab.view
