@@ -38,6 +38,7 @@ from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
 from jmorl.units import initial_units, measured_in
 
+EARLY = 1 / 8  # of the warm-up, after which its agents are something to look at
 CONFIRMATION = 2**32 - 1  # the stream of random numbers of confirmations; evaluations count from 0
 
 
@@ -50,6 +51,7 @@ def run(
     history: Sequence[RunRecord] = (),
     selecting: Callable[[], AbstractContextManager[object]] = nullcontext,
     ask_now: bool = False,
+    early: Callable[[tuple[Policy, ...]], None] | None = None,
 ) -> Iterator[Event]:
     """Train and choose as `config` says, yielding an event for everything that happens.
 
@@ -58,7 +60,9 @@ def run(
     An `environment` that is not the config's is refused with NotAsDeclared.
     The `history` of its decisions is what a stand-in needs to know then (`ask` and `question` in the config); with
     `ask_now` it leaves the next question to the decision maker. The tasks of a generation are selected within
-    `selecting()`, where nothing is lost if it is broken off.
+    `selecting()`, where nothing is lost if it is broken off. For somebody who wants to look at something meanwhile,
+    `early` is called with the agents after an eighth of the warm-up, which is then made once more from its start; only
+    in raw units.
     A `population` that shares its programs with others is for `jmorl.learning.stack`. Raises TrainingFault in the
     generation in which a number stops being finite, AnswerError for an answer that its question does not allow, and
     MethodError for tasks that cannot be trained; the events before it stand.
@@ -72,7 +76,7 @@ def run(
         decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question, ask_now)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
-    return _Run(config, environment, decision_maker, population, selecting).events(state)
+    return _Run(config, environment, decision_maker, population, selecting).events(state, early)
 
 
 def _check_kind(name: str, value: object, kind: type, how: str) -> None:
@@ -138,11 +142,16 @@ class _Run:
         self.method = make_method(config, environment)
         self.metric_weights = candidate_grid(len(environment.objectives), config.search.weight_divisions)
 
-    def events(self, state: RunState | None) -> Iterator[Event]:
+    def events(
+        self, state: RunState | None, early: Callable[[tuple[Policy, ...]], None] | None = None
+    ) -> Iterator[Event]:
+        """Make the run, from a state or from the beginning."""
         seconds = self.population.compile()
         rate = self.config.steps_per_iteration / self.population.iteration_seconds()
         yield Compiled(seconds, self.population.devices, rate, self._steps(state) if state else 0)
         if state is None:
+            if early and self.config.evaluation.units == "raw":
+                early(self.early_agents())
             finished = self.warm_up()
             yield finished
             state = finished.state
@@ -175,6 +184,17 @@ class _Run:
         assert decided.chosen is not None
         state, [chosen] = self._confirmed(state, [decided.chosen])
         yield RunFinished(state, chosen, "satisfied" if satisfied else "budget")
+
+    def early_agents(self) -> tuple[Policy, ...]:
+        """Return the P agents as they are after the first part of the warm-up."""
+        config, weights = self.config, self.method.problem.weights
+        iterations = max(round(EARLY * config.population.warmup_iterations), 1)
+        train_states, _ = self.population.train(
+            self.population.initialize(_keys(config)[0]), weights, _training_key(config, 0), iterations,
+            config.learning_rate(0),
+        )  # fmt: skip
+        state = RunState(self.method.initial_state())
+        return self._evaluated(state, train_states, weights, None)[1]
 
     def warm_up(self) -> GenerationFinished:
         """Train and evaluate P new agents: generation 0."""

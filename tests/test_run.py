@@ -66,6 +66,22 @@ def test_events_come_in_the_papers_order(interactive):
     assert kinds == [Compiled, GenerationFinished, *[Decided, GenerationFinished] * 3, Decided, RunFinished]
 
 
+def test_who_looks_in_early_sees_the_agents_on_their_way_and_changes_nothing(small_config, interactive):
+    seen = []
+    config = small_config.replace(population={"warmup_iterations": 8})
+    events = list(run(config, Recorder(index=1), early=seen.append))
+    [agents] = seen
+    assert digest(events) == digest(run(config, Recorder(index=1)))
+    short = config.replace(population={"warmup_iterations": 1})
+    for agent, policy in zip(agents, generations(run(short, Recorder(index=1)))[0].offspring, strict=True):
+        assert agent.id == policy.id and agent.generation == 0
+        np.testing.assert_array_equal(agent.values, policy.values)
+    # In paper units every evaluation moves the units.
+    seen.clear()
+    list(run(small_config.replace(evaluation={"units": "paper"}), Recorder(), early=seen.append))
+    assert not seen
+
+
 def test_steps_are_counted(interactive):
     assert [event.steps for event in generations(interactive[1])] == [4 * 3 * 16 * done for done in (2, 5, 8, 11)]
     evaluated = [event.state.evaluation_steps for event in generations(interactive[1])]

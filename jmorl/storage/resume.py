@@ -60,11 +60,12 @@ class Continued:
         asking: Callable[[], AbstractContextManager[object]] = nullcontext,
         population: Population | None = None,
         selecting: Callable[[], AbstractContextManager[object]] = nullcontext,
+        early: Callable[[tuple[Policy, ...]], None] | None = None,
     ) -> Iterator[Event]:
         """Run on, recording every event before it is passed on; answers that the log has are not asked for again.
 
-        `user` takes the place of the run's own, and is asked within `asking()`; `population` and `selecting` are as in
-        `run`.
+        `user` takes the place of the run's own, and is asked within `asking()`; `population`, `selecting` and
+        `early` are as in `run`.
         """
         config, environment = self.folder.config, self.folder.environment
         user = user or self.user or make_user(config.user, environment.objectives)
@@ -73,7 +74,8 @@ class Continued:
         parent = self.folder.manifest["parent"] or {}
         before = parent.get("generation", 0) if parent.get("another_user") else 0  # what somebody else has said
         answered = [record for record in decisions.answered if record.generation > before]
-        for event in run(config, remembered, environment, self.state, population, answered, selecting, self.ask_now):
+        made = run(config, remembered, environment, self.state, population, answered, selecting, self.ask_now, early)
+        for event in made:
             self.folder.record(event)
             yield event
 

@@ -85,22 +85,22 @@ def listed(view: View, selection: Selection) -> list[int] | None:
 
 
 def to_begin_with(view: View, axes: tuple[int, int]) -> Selection:
-    """Lay out what the open question is best begun with: A, in focus, and a policy on either side of it.
+    """Lay out what the open question, or a look at early agents, is best begun with: A, in focus, with two beside it.
 
     A is the last choice, or what has replaced it. B is better in the objective to the right in the chart, C in the one
     upwards: the nearest of the new policies, or else of all. Before the first choice A is a compromise, and B and C
     are the ends of the front. A question about a pair lays out the pair.
     """
-    assert view.question
-    shown = view.question.front
-    if view.question.form == "pair" or view.question.again:
+    question = view.question
+    shown = question.front if question else view.front
+    if question and (question.form == "pair" or question.again):
         anchor, sides = shown[0], list(shown[1:2])
     elif view.previous is None:
         anchor, sides = _compromise(shown), _ends(shown, axes)
     else:
         anchor = last_choice(view) or _compromise(shown)
         sides = _beside(view, shown, anchor, axes)
-    selection = Selection(limits=view.question.limits)
+    selection = Selection(limits=question.limits if question else None)
     for policy in (anchor, *sides):
         selection = selection.with_policy(policy.id)
     return replace(selection, places={**selection.places, LETTERS[0]: selection.places[LETTERS[0]]}, focus=anchor.id)

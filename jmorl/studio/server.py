@@ -39,7 +39,7 @@ ICON = (
     'stroke="#0072B2" stroke-width="2.5"/><circle cx="10" cy="6.5" r="2.6" fill="#E69F00"/></svg>'
 )
 ENGLISH = '<script>document.documentElement.lang = "en";</script>'
-DIAL_STEPS = 300  # of an episode, that are shown of a blend: the dial does not wait for more
+DIAL_STEPS = 300  # of an episode, that are shown of a blend or an early agent: nobody waits for more
 RECORDING = threading.Lock()
 KEPT = "private, max-age=86400"  # an episode never changes
 
@@ -111,6 +111,14 @@ def _add_files(session: Session) -> None:
     def episode(run: str, policy: int) -> JSONResponse:
         with _not_there():
             return JSONResponse(_episode(_file(session, run, policy)), headers={"cache-control": KEPT})
+
+    @app.get("/early/{run}/{policy}")
+    def early_episode(run: str, policy: int) -> JSONResponse:
+        agent = session.early_policy(run, policy)
+        if agent is None:
+            raise HTTPException(404, "the warm-up is over")
+        with _not_there():
+            return JSONResponse(_recorded(agent, DIAL_STEPS))
 
     @app.get("/between/{run}/{first}/{second}/{per_cent}.npz")
     def blend_file(run: str, first: int, second: int, per_cent: int) -> Response:

@@ -13,6 +13,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import envs
 from jmorl.decision.answers import Answer, AnswerError, PointAnswer
@@ -23,10 +24,11 @@ from jmorl.loop import make_method
 from jmorl.methods.base import MethodError, Prospect
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
+from jmorl.search.policy import Policy
 from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
-from jmorl.storage.policy_file import PolicyFileError, load_policy
+from jmorl.storage.policy_file import PolicyFileError, StoredPolicy, load_policy, save_policy
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
@@ -148,8 +150,9 @@ class Session:
     def begin_dialogue(self, iterations: int, points: int) -> None:
         """Begin E-NAUTILUS on the front. Raises ValueError if there is none, or for numbers below 1."""
         view = self.view
-        generation = view.generations[-1].number if view.generations else 0
-        self._move_to(dialogues.begin(view.front, view.objectives, generation, iterations, points))
+        if not view.generations:
+            raise ValueError("there is no front yet: the warm-up is still going on")
+        self._move_to(dialogues.begin(view.front, view.objectives, view.generations[-1].number, iterations, points))
 
     def reply(self, at: Dialogue, answer: PointAnswer) -> bool:
         """Answer in E-NAUTILUS. Return False if the dialogue has moved on. Raises ValueError for a wrong answer."""
@@ -166,6 +169,17 @@ class Session:
     def close_dialogue(self) -> None:
         """Leave E-NAUTILUS."""
         self.dialogue = None
+
+    def early_policy(self, run: str, policy: int) -> StoredPolicy | None:
+        """Return an agent in the middle of the warm-up of the open run; None if there is none."""
+        view = self.view
+        agent = view.policy(policy) if view.early and view.run == run else None
+        if agent is None:
+            return None
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "agent.npz"
+            save_policy(file, agent, envs.make(view.config.env), view.config)
+            return load_policy(file)
 
     def policy_file(self, run: str, policy: int) -> Path | None:
         """Return the file of an archived policy of a run in the history, the result's with its confirmed score.
@@ -234,7 +248,7 @@ class Session:
         """Run to the end, or until the run is left, and keep the view up to date; the thread of the run does this."""
         try:
             with continued.folder:
-                for event in continued.events(person):
+                for event in continued.events(person, early=self._show_early):
                     self.view = after(self.view, event, self.clock())
                     if self.leaving and not isinstance(event, RunFinished):
                         break
@@ -253,6 +267,10 @@ class Session:
         """Show what the folder has."""
         self.prospects, self._worked_out, self.dialogue = {}, set(), None
         self.view = stored_view(path)
+
+    def _show_early(self, agents: tuple[Policy, ...]) -> None:
+        """Show agents in the middle of the warm-up."""
+        self.view = replace(self.view, front=agents)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
         if self.view.question is not question:  # it is answered: the processors train

@@ -80,9 +80,9 @@ class Tab:
 
     @property
     def pair(self) -> tuple[int, int] | None:
-        """Return the first two policies that are laid out; None for fewer."""
+        """Return the first two policies that are laid out; None for fewer, and in the warm-up."""
         first, second, *_ = [*self.selection.letters, None, None]
-        return None if first is None or second is None else (first, second)
+        return None if first is None or second is None or self.view.early else (first, second)
 
     async def score_between(self, run_id: str, first: int, second: int, per_cent: int) -> BlendScore | None:
         """Return what the blend of two policies returns; None, and why, if it cannot be scored."""
@@ -98,7 +98,8 @@ class Tab:
         if view.question is not before.question:
             self.generations, self.ending = 1, None
         self._limited = self._limited and view.run == before.run
-        if view.run != before.run or (view.question and view.question is not before.question):
+        asked = view.question is not None and view.question is not before.question
+        if view.run != before.run or asked or view.early != before.early:
             self._begin()
         elif view is not before:
             self._lay_out(self.selection.known_in(view))
@@ -278,7 +279,7 @@ class Tab:
 
     def _begin(self) -> None:
         """Lay out what the open question is best begun with, or the result."""
-        if self.view.question:
+        if self.view.question or self.view.early:
             selection = to_begin_with(self.view, self.axes)
             self._lay_out(replace(selection, limits=self.selection.limits) if self._limited else selection)
         elif self.view.result:

@@ -22,7 +22,8 @@ LIMITS_HINT = (
     "Say what each objective must reach. What does not is left out of the table and grey in the chart; with your next "
     "answer the search keeps to it, too."
 )
-WARM_UP = "The first policies learn the basics. You see them when the warm-up is over."
+WARM_UP = "The first policies learn the basics. You soon see how they do."
+EARLY = "The first policies, still learning. You are asked when the warm-up is over."
 INTRODUCTION = (
     "Policies are trained that trade {objectives} against each other. After a round of training you say which one you "
     "like best; the next round searches around it. Nothing is final: you can go back to any earlier question."
@@ -136,7 +137,7 @@ def heading(view: View, selection: Selection) -> str:
     if view.timeline is None:
         return "Look around, step back in the history, or go on with this run."
     if not view.generations:
-        return WARM_UP
+        return EARLY if view.early else WARM_UP
     if view.config.user != PERSON:
         return f"User {view.config.user} decides; you watch."
     if view.rounds_to_question is None:
@@ -278,6 +279,8 @@ def remark(view: View, policy: Policy) -> str:
         return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
     if view.question and view.question.purpose == "final":
         return _certainty(view, policy)
+    if view.early:
+        return "still learning"
     return f"trained in round {policy.generation}" if policy.generation else "trained in the warm-up"
 
 

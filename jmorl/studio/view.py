@@ -51,7 +51,7 @@ class View:
     config: Config
     objectives: tuple[Objective, ...]
     generations: tuple[Generation, ...]  # the warm-up first; empty before its end
-    front: tuple[Policy, ...]  # the archive; empty before the end of the warm-up
+    front: tuple[Policy, ...]  # the archive; in the warm-up nothing, or `early` agents
     bounds: np.ndarray  # [M] in force, -inf before the first choice
     previous: Policy | None  # chosen last
     choices: tuple[tuple[int, np.ndarray], ...]  # so far: the generation each was made for, and its values [M]
@@ -76,6 +76,11 @@ class View:
         """Return a policy that can be looked at, if it is there."""
         known = (*self.front, *filter(None, (self.previous, self.result)))
         return next((policy for policy in known if policy.id == policy_id), None)
+
+    @property
+    def early(self) -> bool:
+        """Whether the front is of agents in the middle of their warm-up, of which nothing is kept."""
+        return bool(self.front) and not self.generations
 
     def choosable(self, policy_id: int) -> bool:
         """Return whether a policy may be the answer to the open question, shown in it or not."""

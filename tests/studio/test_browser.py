@@ -44,8 +44,11 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
     with Served("--out", path, "--steps", 624_000, "--population.iterations", 4, "--ask", "always") as studio:
         tab = Tab(browser, studio.address)
         tab.page.get_by_text("Warm-up: training 6 new agents").wait_for()
+        tab.page.get_by_text("still learning").first.wait_for()
         tab.screenshot("1-warm-up")
+        assert not tab.page.get_by_role("button", name="Choose A").is_visible()
         tab.asked(1)
+        assert not tab.page.get_by_text("still learning").count()
         assert tab.bounds() is None
 
         # Two policies beside each other, at work; what choosing the one in focus would mean.

@@ -51,6 +51,29 @@ def test_a_run_steered_on_the_page_replays_from_its_log_to_the_same_result(sessi
     assert (view.path / "plots").is_dir()
 
 
+def test_early_agents_can_be_looked_at_in_the_warm_up_and_leave_nothing_behind(person_config, make_session, tmp_path):
+    session, seen = make_session(), []
+    show = session._show_early
+
+    def show_early(agents):
+        """Look around in the middle of the warm-up, as a page does."""
+        show(agents)
+        view = session.view
+        with pytest.raises(ValueError, match="warm-up is still going on"):
+            session.begin_dialogue(3, 3)
+        seen.append((view, session.early_policy(view.run, 0), session.early_policy("another", 0)))
+
+    session._show_early = show_early
+    folder = RunFolder.create(tmp_path / "run", person_config, envs.make(person_config.env))
+    session.drive(Continued(folder, None))
+    session.question()
+    [(view, agent, nobody)] = seen
+    assert view.early and len(view.front) == person_config.population.agents and not view.choosable(0)
+    np.testing.assert_allclose(agent.header["values"], view.front[0].values)
+    assert nobody is None and not session.view.early and session.early_policy(view.run, 0) is None
+    assert len(read_run(folder.path).policies) == person_config.population.agents
+
+
 def test_the_first_answer_counts_and_the_second_is_told(session):
     question = session.question()
     first, second = question.front[0].id, question.front[-1].id

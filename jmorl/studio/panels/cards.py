@@ -59,16 +59,17 @@ class Card:
             ui.label(letter).classes(f"letter mark-{letter}")
             ui.label(f"policy {policy.id}").classes("card-title")
             address = f"/policies/{view.run}/{policy.id}.npz"
-            ui.button(icon="download", on_click=lambda: ui.download(address)).props(
-                f'flat dense round size=xs aria-label="save the file of policy {policy.id}"'
-            )
+            if not view.early:
+                ui.button(icon="download", on_click=lambda: ui.download(address)).props(
+                    f'flat dense round size=xs aria-label="save the file of policy {policy.id}"'
+                )
             ui.button(icon="close", on_click=lambda: tab.put_away(policy.id)).props(
                 f'flat dense round size=xs aria-label="put policy {policy.id} away"'
             )
         self.standing = ui.label().classes("standing")
         player = Player()
         digits = texts.decimals(view)
-        player.props["src"] = f"/episodes/{view.run}/{policy.id}"
+        player.props["src"] = f"/{'early' if view.early else 'episodes'}/{view.run}/{policy.id}"
         player.props["objectives"] = [f"{each.label} so far" for each in view.objectives]
         player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]
         player.props["label"] = f"policy {policy.id} at work"
