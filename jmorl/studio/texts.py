@@ -96,6 +96,11 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
     return "Thinking"
 
 
+def title(view: View) -> str:
+    """Name the browser's tab after the run, and say there that a question waits."""
+    return f"{'Your turn: ' if view.question else ''}{view.path.name} – jmorl studio"
+
+
 def facts(view: View, now: float) -> str:
     """Say how far the run is, and how fast; nothing for a run that does not go on."""
     timeline = view.timeline

@@ -47,7 +47,9 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         tab.page.get_by_text("still learning").first.wait_for()
         tab.screenshot("1-warm-up")
         assert not tab.page.get_by_role("button", name="Choose A").is_visible()
+        assert tab.page.title() == "first – jmorl studio"
         tab.asked(1)
+        tab.page.wait_for_function("document.title === 'Your turn: first – jmorl studio'")
         assert not tab.page.get_by_text("still learning").count()
         assert tab.bounds() is None
 

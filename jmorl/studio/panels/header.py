@@ -10,11 +10,11 @@ TICK_SECONDS = 1.0  # between two times that are shown
 
 
 class Header:
-    """The name of the run, its phase, its budget and its speed."""
+    """The name of the run, its phase, its budget and its speed; in the browser's own tab, whether a question waits."""
 
     def __init__(self, tab: Tab):
         self.tab = tab
-        self.shown = Shown()
+        self.shown, self.titled = Shown(), Shown()
         self.next_tick = 0.0  # on the session's clock
         with ui.element("h1").classes("brand"):
             ui.label("jmorl studio")
@@ -31,6 +31,9 @@ class Header:
         if not self.shown.is_new(view) and now < self.next_tick:
             return
         self.next_tick = now + TICK_SECONDS
+        title = texts.title(view)
+        if self.titled.is_new(title):
+            ui.page_title(title)
         self.run_name.set_text(f"{view.path.name} · {view.config.env}")
         self.phase.set_text(texts.phase(view, now, session.leaving))
         self.facts.set_text(texts.facts(view, now))
