@@ -352,7 +352,7 @@ def test_export_copies_a_policy(trained, tmp_path, capsys):
     target = tmp_path / "policy.npz"
     assert main(["export", str(trained), "--policy", str(policy), "--to", str(target)]) == 0
     said, values = capsys.readouterr().out, load_policy(target).header["values"]
-    assert said.startswith(f"{target}: policy {policy}, north {number(values[0])}, ") and said.count("\n") == 1
+    assert said.startswith(f"{target}: policy {policy}, north {number(values[0])} units, ") and said.count("\n") == 1
     assert load_policy(target).header["id"] == policy
     assert main(["export", str(trained), "--to", str(target)]) == 2
     assert "exists; choose another file, or overwrite it with --force" in capsys.readouterr().err

@@ -280,6 +280,7 @@ class DecisionMaker(ABC):
     """
 
     patient = False
+    signs = False  # whether they name the result of a run themselves, however clear it is
 
     @abstractmethod
     def answer(self, question: Question) -> Answer:

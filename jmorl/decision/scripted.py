@@ -30,6 +30,7 @@ class ScriptedUser(DecisionMaker):
         decisions = [record for record in records if isinstance(record, DecisionRecord)]
         self._steering = _timeline(record for record in decisions if record.purpose == "steer")
         self._final = _timeline(record for record in decisions if record.purpose == "final")
+        self.signs = any(not record.stand_in for record in self._final.values())
         self._points = _timeline(record for record in records if isinstance(record, PointRecord))
         self._others = [record for record in records if isinstance(record, AnswerRecord)]
 

@@ -24,6 +24,7 @@ FORMS: dict[Shows, Form] = {"front": "best", "few": "best", "pair": "pair", "ran
 TRUSTED_REGRET = {"steer": 0.07, "final": 0.02}
 DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
 FEWEST_AGAINST = 2  # other answers that it may be against
+EARLIER_ANSWERS = "your earlier answers speak for it, and asking you could hardly improve on it"
 FEW = 5  # policies in a short question
 
 
@@ -31,12 +32,12 @@ class StandIn(Wrapper):
     """Answers as `user` would, by a preference model of their answers, and asks them where it is not sure.
 
     It is sure where its expected regret is small (`TRUSTED_REGRET`); with `ask` "always", or for a patient user, it
-    never is. With `shows` "few" it asks about few policies at a time: the best by expectation, the one that was chosen
-    last, and those whose comparison tells most; with "rank" for their order; with "pair" about two, after which it goes
-    on with the best by expectation, and at the end about few: the result is what the user chooses. `history` has the
-    records of a run that goes on; only what the user said themselves counts. The same answers give the same posterior.
-    With `ask_now` it leaves the next question to the user, however sure it is: so somebody takes back what it has
-    answered.
+    never is, nor at the end for a user who signs. With `shows` "few" it asks about few policies at a time: the best by
+    expectation, the one that was chosen last, and those whose comparison tells most; with "rank" for their order; with
+    "pair" about two, after which it goes on with the best by expectation, and at the end about few: the result is what
+    the user chooses. `history` has the records of a run that goes on; only what the user said themselves counts. The
+    same answers give the same posterior. With `ask_now` it leaves the next question to the user, however sure it is: so
+    somebody takes back what it has answered.
     """
 
     def __init__(
@@ -77,9 +78,8 @@ class StandIn(Wrapper):
         verdict = model.verdict()
         asked = self._shortened(question, model, verdict)
         if self._is_sure(question, verdict) and not self.ask_now and not self.user.remembers(asked):
-            reason = f"your earlier answers speak for it; the loss to expect is {verdict.regret:.1%} of the range"
             self.chose_last = True
-            return question, Answer(question.front[verdict.best].id, stand_in=True, reason=reason)
+            return question, Answer(question.front[verdict.best].id, stand_in=True, reason=EARLIER_ANSWERS)
         self.ask_now = False
         return self._asked(asked)
 
@@ -94,7 +94,9 @@ class StandIn(Wrapper):
         self.limits = answer.limits or self.limits
         said = _said(decision_record(asked, asked.checked(answer)))
         self.answers += [said] if said else []
-        if not answer.stop and (answer.equal or (asked.form == "pair" and answer.ranking)):
+        if answer.equal and asked.again:  # they see no reason to take back what they have just chosen
+            answer = replace(answer, policy=asked.front[1].id)
+        elif not answer.stop and (answer.equal or (asked.form == "pair" and answer.ranking)):
             whole = asked.whole
             answer = replace(answer, policy=whole.front[self._model(whole).verdict().best].id)
         return asked, answer
@@ -123,7 +125,7 @@ class StandIn(Wrapper):
         best, chosen = int(expected.argmax()), ids.index(answer.policy)
         if expected[best] - expected[chosen] < DOUBTED_REGRET:
             return None
-        pair = whole.front[best], whole.front[chosen]
+        pair = whole.front[best], whole.front[chosen]  # the doubt first, then what they have just chosen
         return replace(whole, front=pair, others=_without(whole.front, pair), again=True, limits=self.limits)
 
     def _model(self, question: Question) -> PreferenceModel:
@@ -134,7 +136,8 @@ class StandIn(Wrapper):
     def _is_sure(self, question: Question, verdict: Verdict) -> bool:
         """Return whether the user's earlier answers leave little doubt. Where nothing reaches their limits they do."""
         trusted = bool(self.answers) and verdict.regret <= TRUSTED_REGRET[question.purpose]
-        return self.ask == "unsure" and trusted and self._reachable(question)
+        theirs = question.purpose == "final" and self.signs
+        return self.ask == "unsure" and trusted and not theirs and self._reachable(question)
 
     def _reachable(self, question: Question) -> bool:
         """Return whether a policy reaches the user's limits."""

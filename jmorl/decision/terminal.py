@@ -11,12 +11,14 @@ from jmorl.decision.answers import Adjust, Answer, Back, Choose, PointAnswer
 from jmorl.decision.protocol import DecisionMaker, PointQuestion, Question
 from jmorl.decision.terminal_view import show_front, show_points
 from jmorl.display.console import PlainConsole
+from jmorl.display.readings import direction
 
 LONGEST_NUMBER = 9  # digits
 POLICY_HELP = """\
-A policy is one way to act that was trained. Its scores are means over episodes, ± their spread from episode to episode;
-more is better, unless the head of the column says less. Training goes on around your choice: it looks for nothing
-that is much worse. To choose otherwise later: jmorl branch RUN --generation K --out NEW.
+A policy is one way to act that was trained. Its scores are means over episodes, ± their spread from episode to episode.
+{directions}. Training goes on around your choice: it looks for nothing that is much worse. Where your
+answers leave no doubt, a stand-in chooses for you and says so. To choose otherwise later:
+jmorl branch RUN --generation K --out NEW.
   12           choose policy 12
   Enter        keep the last choice: none of these is better
   12 4 9       prefer policy 12, then 4, then 9, to all others
@@ -44,6 +46,8 @@ class TerminalUser(DecisionMaker):
     choice to end the run with.
     """
 
+    signs = True
+
     def __init__(self, console: PlainConsole | None = None, read: Callable[[str], str] | None = None):
         self.console = console or PlainConsole()
         self.read = read or input
@@ -60,6 +64,9 @@ class TerminalUser(DecisionMaker):
                 continue
             reply = policy_reply(question, "q" if line is None else line)
             match reply:
+                case Answer() if line is None:
+                    self._say(f"The input has ended: policy {reply.policy} is the result, the last choice.")
+                    return replace(reply, limits=None if question.limits == limits else question.limits)
                 case Answer():
                     return replace(reply, limits=None if question.limits == limits else question.limits)
                 case tuple():
@@ -114,7 +121,10 @@ def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, .
     words = line.lower().replace("−", "-").replace(",", " ").replace(">", " ").split()
     name = question.objectives[-1].name
     if words[:1] in (["?"], ["help"]):
-        return POLICY_HELP.format(best=f"best {name}", limit=f"limit {name} {_middle(question)}")
+        directions = "; ".join(f"{each.label}: {direction(each)}" for each in question.objectives)
+        return POLICY_HELP.format(
+            best=f"best {name}", limit=f"limit {name} {_middle(question)}", directions=directions.capitalize()
+        )
     if words[:1] == ["best"]:
         return _objective(question.objectives, " ".join(words[1:]))
     if words[:1] == ["limit"]:

@@ -13,7 +13,7 @@ class Wrapper(DecisionMaker):
 
     def __init__(self, user: DecisionMaker):
         self.user = user
-        self.patient = user.patient
+        self.patient, self.signs = user.patient, user.signs
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""

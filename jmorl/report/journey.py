@@ -27,7 +27,7 @@ h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 HOW_TO = """\
 import jmorl
 policy = jmorl.load_policy("{file}")
-action = policy(observation)  # [{observation}] numbers to [{action}]"""
+action = policy(observation)  # {observation} numbers, as the environment observes them, to {action}"""
 
 
 def how_to(env: str, file: str) -> str:
@@ -54,7 +54,10 @@ def journey_page(run: StoredRun, plots: Sequence[Path]) -> str:
     ]
     if run.chosen:
         lines = how_to(run.config.env, Layout(run.path).chosen.name)
-        parts += ["<h2>How to use the policy</h2>", f"<pre>{escape(lines)}</pre>"]
+        where = (
+            f"{Layout(run.path).chosen.name} is in the folder of the run; the studio saves it under a name of its own."
+        )
+        parts += ["<h2>How to use the policy</h2>", f"<p>{escape(where)}</p>", f"<pre>{escape(lines)}</pre>"]
     parts += ["<h2>Pictures</h2>", *(_picture(plot) for plot in plots)] if plots else []
     parts += ["<h2>The run in numbers</h2>", f"<pre>{escape(_tables(run))}</pre>"]
     head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}</style>'

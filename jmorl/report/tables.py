@@ -34,7 +34,9 @@ from jmorl.storage.stored_run import StoredRun
 def run_tables(run: StoredRun) -> list[RenderableType]:
     """Heading, metrics, decisions and final front of a run, to be printed one after the other."""
     decisions = [decisions_table(run)] if run.decisions else []
-    front = front_table(run.front, run.objectives, run.chosen.id if run.chosen else None)
+    chosen = run.chosen  # with its confirmed score
+    members = [chosen if chosen and policy.id == chosen.id else policy for policy in run.front]
+    front = front_table(members, run.objectives, chosen.id if chosen else None)
     front.title = "Final front" if run.result else "Front so far"
     tables: list[RenderableType] = [run_heading(run), metrics_table(run), *decisions, front]
     return [part for table in tables for part in (table, "")]

@@ -254,7 +254,9 @@ def _more_of_answer(decided: Decided) -> str:
 
 def show_result(console: PlainConsole, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
     """Show the final front, with the chosen policy marked."""
-    table = front_table(event.state.archive.members, objectives, event.chosen.id)
+    chosen = event.chosen  # with its confirmed score
+    front = [chosen if policy.id == chosen.id else policy for policy in event.state.archive.members]
+    table = front_table(front, objectives, chosen.id)
     table.title = "Final front"
     console.print()
     console.print(table)

@@ -82,8 +82,14 @@ class StoredPolicy:
     box: ActionBox
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Return the deterministic action in the environment's own units, within its box."""
-        action: np.ndarray = self.action(np.asarray(observation, np.float32))
+        """Return the deterministic action in the environment's own units, within its box.
+
+        Raises ValueError for observations of another size.
+        """
+        observation, size = np.asarray(observation, np.float32), len(self.observation_mean)
+        if observation.shape[-1:] != (size,):
+            raise ValueError(f"an observation has {size} numbers, not shape {observation.shape}")
+        action: np.ndarray = self.action(observation)
         return action
 
     def action(self, observation: Any, xp: ModuleType = np) -> Any:

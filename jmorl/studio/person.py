@@ -18,6 +18,8 @@ class Person(DecisionMaker):
     however long their last answer was to hold; with `end_with` they answer it beforehand, and the run ends.
     """
 
+    signs = True
+
     def __init__(self, asked: Callable[[Question], None]):
         self.asked = asked
         self._changed = threading.Condition()

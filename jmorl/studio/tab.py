@@ -310,7 +310,7 @@ class Tab:
 
     def _tell_of_wait(self, doing: str) -> None:
         training = self.view.timeline and not self.view.question
-        self.tell(f"{doing} after this generation …" if training else f"{doing} …", "hint")
+        self.tell(f"{doing} after this round …" if training else f"{doing} …", "hint")
 
     def _tell_of_answer(self, question: Question | None, view: View) -> None:
         """Say that the question this tab shows was answered elsewhere. A click on its way would come to nothing."""

@@ -18,6 +18,7 @@ from jmorl.studio.view import PERSON, View
 # Titles of panels:
 POLICIES, PROGRESS, HISTORY, NAVIGATION, BETWEEN = "Policies", "Progress", "History", "E-NAUTILUS", "Between"
 LIMITS = "Limits"
+LIMITS_LATER = "What does not reach this is left out of the table and grey in the chart."
 LIMITS_HINT = (
     "Say what each objective must reach. What does not is left out of the table and grey in the chart; with your next "
     "answer the search keeps to it, too."
@@ -26,7 +27,8 @@ WARM_UP = "The first policies learn the basics. You soon see how they do."
 EARLY = "The first policies, still learning. You are asked when the warm-up is over."
 INTRODUCTION = (
     "Policies are trained that trade {objectives} against each other. After a round of training you say which one you "
-    "like best; the next round searches around it. Nothing is final: you can go back to any earlier question."
+    "like best; the next round searches around it. What your answers leave no doubt about is chosen for you. Nothing is"
+    " final: you can go back to any earlier question."
 )
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
 ASK_NOW_HINT = "The next question comes when this round is over."
@@ -49,9 +51,11 @@ LOST = (
     "The studio does not answer: nothing that you press counts now. What the run has is kept. This page goes on by "
     "itself as soon as the studio is there again. If it was ended, start it again: {command}"
 )
+NONE_REACHES = "None of them reaches your limits."
 LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
 SCORING = "Scoring …"
+SURELY = 3  # standard errors that a score must lie behind another to be called worse
 MOST_POINTS, LONGEST_POINTS = 3, 150  # that the prediction model is quoted with, and their characters
 KEYS = (
     ("← →", "look at the next policy along the front"),
@@ -131,8 +135,9 @@ def heading(view: View, selection: Selection) -> str:
     if question:
         purpose, generation, form, again = question.purpose, question.generation, question.form, question.again
         asked = front_question(purpose, generation, len(question.front), form, again)
-        last = view.timeline is not None and view.timeline.left == 1 and purpose == "steer"
-        return f"{asked} {LAST_ROUND}" if last else asked
+        if view.timeline is not None and view.timeline.left == 1 and purpose == "steer":
+            asked = f"{asked} {LAST_ROUND}"
+        return asked if reaching(view, selection).any() else f"{asked} {NONE_REACHES}"
     if view.result:
         values = minus(values_in_words(view.result.values, writers_of(view)))
         return f"The result is policy {view.result.id}: {values}"
@@ -151,9 +156,10 @@ def heading(view: View, selection: Selection) -> str:
         return END_LATER
     if view.stand_in and view.previous:
         return f"Policy {view.previous.id} was chosen for you: {view.stand_in}."
+    unless = "" if view.asking or view.config.ask == "always" else ", unless your answers leave no doubt"
     if view.rounds_to_question > 1:
-        return f"You are asked again in {view.rounds_to_question} rounds."
-    return "You are asked when this round is over."
+        return f"You are asked again in {view.rounds_to_question} rounds{unless}."
+    return f"You are asked when this round is over{unless}."
 
 
 def lost(view: View) -> str:
@@ -243,11 +249,17 @@ def blend_name(selection: Selection, pair: tuple[int, int], per_cent: int) -> st
     return f"{100 - per_cent} % of {first}, {per_cent} % of {second}"
 
 
-def blend_scores(view: View, score: BlendScore) -> str:
-    """Return the scores of a blend in one line, as those of a policy."""
+def blend_scores(view: View, score: BlendScore, pair: tuple[int, int]) -> str:
+    """Return the scores of a blend in one line, as those of a policy, and where it is worse than both of its own."""
     each = zip(view.objectives, _with_units(view, score.mean, score.std), strict=True)
     found = [f"{objective.label} {text}" for objective, text in each]
-    return f"{', '.join(found)}, over {plural(EPISODES, 'episode')}"
+    told = f"{', '.join(found)}, over {plural(EPISODES, 'episode')}"
+    ends, episodes = [policy for policy in map(view.policy, pair) if policy], view.config.evaluation.episodes
+    errors = [np.sqrt(score.std**2 / EPISODES + policy.std**2 / episodes) for policy in ends]
+    behind = [policy.values - score.mean > SURELY * error for policy, error in zip(ends, errors, strict=True)]
+    worse = np.all(behind, axis=0) & bool(ends)
+    labels = [objective.label for objective, is_worse in zip(view.objectives, worse, strict=True) if is_worse]
+    return f"{told}. Worse than either of the two in {' and '.join(labels)}." if labels else told
 
 
 def raw_returns(view: View, policy: Policy) -> str:
@@ -282,7 +294,7 @@ def remark(view: View, policy: Policy) -> str:
     """Say where a policy comes from, that it cannot be chosen, or how far its scores can be trusted as the result's."""
     if view.question and not view.choosable(policy.id):
         return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
-    if view.question and view.question.purpose == "final":
+    if view.result or (view.question and view.question.purpose == "final"):
         return _certainty(view, policy)
     if view.early:
         return "still learning"
@@ -300,10 +312,13 @@ def outlook(view: View, selection: Selection) -> str:
         return f"{letter} …"
     kept = int(prospect.kept.sum())
     narrows = f"{letter} the search narrows to the dashed area, with {kept} of {plural(len(prospect.kept), 'policy')}."
-    if not len(prospect.expected):
-        return f"{narrows} Nothing new is expected there."
-    best = dict.fromkeys(prospect.expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
-    points = [minus(values_in_words(prospect.expected[row], writers_of(view))) for row in best]
+    if kept == len(prospect.kept):
+        narrows = f"{letter} the search goes on around all {plural(kept, 'policy')}."
+    expected = prospect.expected[[not within(view.values, point).any() for point in prospect.expected]]
+    if not len(expected):
+        return f"{narrows} Nothing better than what is there is expected."
+    best = dict.fromkeys(expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
+    points = [minus(values_in_words(expected[row], writers_of(view))) for row in best]
     count = max(1, sum(length <= LONGEST_POINTS for length in accumulate(len(point) for point in points[:MOST_POINTS])))
     odds = f"{10 * prospect.odds:.0f} of 10 such forecasts come true."
     return f"{narrows} It may find {'; or '.join(points[:count])}. {odds}"

@@ -28,6 +28,7 @@ from jmorl.units import measured_in
 
 PERSON = "terminal"  # the config's user whose questions are put on the page
 UNRECORDED = "your earlier answers speak for it"  # why a stand-in answered, as far as a log tells
+EQUAL = "you saw no difference, and your earlier answers speak for it"
 Asking = Literal["question", "end"]
 
 
@@ -120,7 +121,7 @@ def stored_view(path: Path) -> View:
     return replace(
         nothing,
         generations=_generations(stored),
-        front=stored.front,
+        front=_with(stored.front, stored.chosen) if stored.chosen else stored.front,
         bounds=stored.bounds[-1],
         previous=stored.policies[decisions[-1].policy] if decisions else None,
         choices=tuple((record.generation, np.array(record.values)) for record in decisions),
@@ -150,10 +151,19 @@ def after(view: View, event: Event, now: float) -> View:
             choices = (*view.choices, (event.question.generation, chosen.values))
             asked, generation = event.question.was_asked(event.answer), event.question.generation
             view = replace(view, question=None, bounds=event.bounds, previous=chosen, choices=choices)
-            return replace(view, answered=generation, stand_in="") if asked else replace(view, stand_in=_reason(event))
+            if not asked:
+                return replace(view, stand_in=_reason(event))
+            equal = event.answer.equal and not getattr(event.question, "again", False)  # else their own choice stands
+            return replace(view, answered=generation, stand_in=EQUAL if equal else "")
         case RunFinished():
-            return replace(view, result=event.chosen, reason=REASONS[event.reason], timeline=None)
+            front = _with(view.front, event.chosen)
+            return replace(view, front=front, result=event.chosen, reason=REASONS[event.reason], timeline=None)
     return view
+
+
+def _with(front: tuple[Policy, ...], scored: Policy) -> tuple[Policy, ...]:
+    """Return the front with a policy as it was scored last."""
+    return tuple(scored if policy.id == scored.id else policy for policy in front)
 
 
 def _reason(event: Decided) -> str:

@@ -13,8 +13,10 @@ from jmorl.cli import main
 from jmorl.decision.answers import Answer
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
 from jmorl.decision.scripted import ScriptedUser
-from jmorl.decision.stand_in import DOUBTED_REGRET, StandIn
+from jmorl.decision.stand_in import DOUBTED_REGRET, TRUSTED_REGRET, StandIn
+from jmorl.decision.terminal import TerminalUser
 from jmorl.decision.users import make_user
+from jmorl.studio.person import Person
 from tests.resuming import Counting, follow, go_on, outcome, train
 
 
@@ -489,6 +491,26 @@ def test_who_corrects_themselves_is_not_asked_a_third_time(mistaken):
     asked, second = stand_in.decide(further)
     assert second.policy == further.front[0].id and not second.stand_in
     assert stand_in.follow_up(asked, second) is None
+
+
+def test_who_then_sees_no_difference_keeps_what_they_have_just_chosen(mistaken):
+    stand_in, question, answer = mistaken()
+    stand_in.user = Says(lambda asked: Answer(asked.front[0].id, equal=True))
+    _, second = stand_in.decide(stand_in.follow_up(question, answer))
+    assert second.equal and second.policy == answer.policy
+
+
+@pytest.mark.parametrize("signs", [True, False])
+def test_who_signs_names_the_result_however_clear_it_is(growing, monkeypatch, signs):
+    monkeypatch.setitem(TRUSTED_REGRET, "final", 1.0)  # as clear as can be
+    user = Says(chooses)
+    user.signs = signs
+    *steering, last = growing(9)
+    stand_in = StandIn(user, 1)
+    live(stand_in, steering)
+    asked, answer = stand_in.decide(replace(last, purpose="final"))
+    assert answer.stand_in != signs and (user.questions[-1] is asked) == signs
+    assert TerminalUser.signs and Person.signs
 
 
 @pytest.mark.parametrize("changes", [{"stand_in": True}, {"stop": True}])

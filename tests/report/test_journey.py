@@ -15,7 +15,7 @@ def test_a_page_has_the_result_how_to_use_it_the_plots_and_the_tables(make_run, 
     write_journey(run, plots, path)
     page = path.read_text(encoding="utf-8")
     assert f"The result is policy {run.chosen.id}: " in page and "jmorl.load_policy(&quot;chosen.npz&quot;)" in page
-    assert "[2] numbers to [1]" in page  # MountainCar
+    assert "2 numbers, as the environment observes them, to 1" in page  # MountainCar
     pictures = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
     assert [base64.b64decode(each) for each in pictures] == [plot.read_bytes() for plot in plots]
     assert "Decisions" in page and "Final front" in page

@@ -46,6 +46,12 @@ def rewritten(path, change):
     np.savez(path, **arrays | {"header": np.array(json.dumps(header))})
 
 
+@pytest.mark.parametrize("observation", [-0.5, [0.1], np.zeros((3, 9))])
+def test_an_observation_of_another_size_is_refused(saved, observation):
+    with pytest.raises(ValueError, match="an observation has"):
+        load_policy(saved[0] / "chosen.npz")(observation)
+
+
 def test_the_header_says_what_the_policy_is(saved, environment, small_config):
     folder, policy = saved
     header = load_policy(folder / "chosen.npz").header

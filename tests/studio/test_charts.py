@@ -285,9 +285,9 @@ def test_the_heading_says_what_is_asked(view):
 @pytest.mark.parametrize(
     ("silent", "user", "text"),
     [
-        (1, "terminal", "You are asked when this round is over."),
-        (3, "terminal", "You are asked again in 3 rounds."),
-        (99, "terminal", "You are asked again in 9 rounds."),  # as many as are left
+        (1, "terminal", "You are asked when this round is over, unless your answers leave no doubt."),
+        (3, "terminal", "You are asked again in 3 rounds, unless your answers leave no doubt."),
+        (99, "terminal", "You are asked again in 9 rounds, unless your answers leave no doubt."),  # as many as are left
         (None, "terminal", "You are asked once, at the end."),
         (1, "A", "User A decides; you watch."),
     ],

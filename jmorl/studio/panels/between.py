@@ -42,7 +42,7 @@ class BetweenPanel:
             return
         score = await self.tab.score_between(*self.place, self.per_cent)
         if score is not None and at == (self.place, self.per_cent):
-            self.scores.set_text(texts.blend_scores(self.tab.view, score))
+            self.scores.set_text(texts.blend_scores(self.tab.view, score, self.place[1:]))
 
     def show(self) -> None:
         """Show the dial of the first two policies that are laid out, while this panel is the one that is open."""

@@ -17,7 +17,7 @@ class EndingDialog:
             ui.label(texts.END_TITLE).classes("title")
             self.text = ui.label().classes("explanation")
             self.buttons = ui.element("div").classes("endings")
-            ui.button("Go on", on_click=self.dialog.close).props("flat no-caps")
+            ui.button("Not yet", on_click=self.dialog.close).props("flat no-caps")
         self.dialog.on_value_change(self._closed)
 
     def show(self) -> None:

@@ -18,7 +18,7 @@ class LimitsPanel:
         self.shown = Shown()
         self.showing = False  # what the tab holds, which is no input
         with ui.element("div").classes("limits"):
-            ui.label(texts.LIMITS_HINT).classes("explanation")
+            self.hint = ui.label().classes("explanation")
             with ui.element("div").classes("limit-rows"):
                 rows = [self._add_row(index) for index in range(len(tab.view.objectives))]
             self.numbers, self.ranges = zip(*rows, strict=True)
@@ -29,6 +29,7 @@ class LimitsPanel:
         view, selection = self.tab.view, self.tab.selection
         if not self.shown.is_new(view, selection):
             return
+        self.hint.set_text(texts.LIMITS_LATER if view.result else texts.LIMITS_HINT)
         limits = selection.limits or (-math.inf,) * len(view.objectives)
         self.showing = True
         for number, objective, least in zip(self.numbers, view.objectives, limits, strict=True):
