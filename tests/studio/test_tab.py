@@ -391,9 +391,9 @@ def test_a_blend_is_scored_and_named(watching, question):
     between = asyncio.run(tab.score_between(tab.view.run, first, second, 40))
     assert not np.array_equal(between.mean, ends[0].mean) and not np.array_equal(ends[0].mean, ends[1].mean)
     assert "over 16 episodes" in texts.blend_scores(tab.view, between, (first, second))
-    as_good = replace(between, mean=question.front[0].values)
+    as_good = between._replace(mean=question.front[0].values)
     assert texts.blend_scores(tab.view, as_good, (first, second)).endswith("over 16 episodes")
-    bad = replace(as_good, mean=as_good.mean - 1e3 * np.eye(3)[0])
+    bad = as_good._replace(mean=as_good.mean - 1e3 * np.eye(3)[0])
     told = texts.blend_scores(tab.view, bad, (first, second))
     assert told.endswith(f". Worse than either of the two in {tab.view.objectives[0].label}.")
     names = [texts.blend_name(tab.selection, (first, second), per_cent) for per_cent in (-10, 0, 40, 100, 120)]
