@@ -39,6 +39,7 @@ class Layout(_Folder):
     lock = _Inside("run.lock")
     enautilus = _Inside("enautilus.json")
     enautilus_log = _Inside("enautilus.jsonl")
+    notes = _Inside("notes.json")
 
     def policy(self, policy_id: int) -> Path:
         """Return where the file of an archived policy is."""

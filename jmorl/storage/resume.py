@@ -31,6 +31,7 @@ from jmorl.storage.files import remove, remove_partial, write_json, written_whol
 from jmorl.storage.layout import Layout, checkpoint_path
 from jmorl.storage.lock import FolderInUse, RunLock
 from jmorl.storage.manifest import Manifest, circumstances, differences, now
+from jmorl.storage.notes_file import read_notes, write_notes
 from jmorl.storage.policy_file import PolicyFileError, holds, load_policy
 from jmorl.storage.run_folder import RunFolder, check_free
 from jmorl.storage.stored_run import read_run
@@ -156,7 +157,8 @@ def branch(
 ) -> Continued:
     """Make a new run, in the folder `out`, that begins where a run was after a generation.
 
-    It has the earlier run's logs up to there and decides for itself from then on, at once. `user` says who, if not as
+    It has the earlier run's logs, and the notes about its policies, up to there, and decides for itself from then on,
+    at once. `user` says who, if not as
     before: what somebody else has said then counts no more. `steps` says how many environment steps it may use, those
     before it included. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or
     has a script that cannot be read, ConfigError; nothing is made then.
@@ -184,6 +186,7 @@ def branch(
     try:
         _restore_logs(folder, checkpoint)
         notes = _restore_policies(folder, Layout(path), state)
+        notes += _take_over_notes(folder, path, state)
         folder.write_front(state.archive.members)
         folder.checkpoints.save(state, folder.logs())
         folder.checkpoints.wait()
@@ -355,6 +358,13 @@ def _restore_policies(folder: RunFolder, source: Layout, state: RunState) -> lis
     members: tuple[Policy, ...] = state.archive.members
     folder.save_policies([policy for policy in members if not folder.layout.policy(policy.id).exists()])
     return notes
+
+
+def _take_over_notes(folder: RunFolder, source: Path, state: RunState) -> list[str]:
+    """Give a branch the notes about the policies that it shares. Returns why there are none, if they cannot be read."""
+    noted = read_notes(source)
+    write_notes(folder.path, noted.before(state.policies))
+    return [f"{noted.problem}; the branch begins without notes"] if noted.problem else []
 
 
 def _with_snapshots(folder: RunFolder, state: RunState) -> tuple[Policy, ...]:

@@ -13,6 +13,7 @@ policies/ID.npz  each policy that entered the archive
 checkpoints/     the whole state after each of the last generations (`jmorl.storage.checkpoints`)
 result.json      the chosen policy and why the run ended, the last file to be written; chosen.npz is its file
 plots/           drawn at the end
+notes.json       what somebody has noted about the run and its policies (`jmorl.storage.notes_file`); no run needs it
 run.lock         while a process writes the folder
 
 Nothing in it names a place outside it, so it may be moved.

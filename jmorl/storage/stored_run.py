@@ -21,6 +21,7 @@ from jmorl.storage.documents import check_fields, json_object
 from jmorl.storage.families_file import Families, read_families
 from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import check_config, read_manifest
+from jmorl.storage.notes_file import Notes, read_notes
 from jmorl.storage.versions import NewerFormat
 from jmorl.units import measured_in
 
@@ -58,6 +59,7 @@ class StoredRun:
     decisions: tuple[Record, ...]
     result: Mapping[str, Any] | None  # None for a run that has not ended
     families: Families | None = None  # of the front that was blended last; None if none was
+    notes: Notes = Notes()
 
     @property
     def chosen(self) -> Policy | None:
@@ -104,7 +106,8 @@ def read_run(path: Path | str) -> StoredRun:
         front = tuple(by_id[_whole_number(row["policy"])] for row in read_rows(layout.front))
     generations = len(metrics["generation"])
     decisions = tuple(record for record in decisions if record.generation <= generations)
-    run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result, families)
+    notes = read_notes(path)
+    run = StoredRun(path, config, manifest, objectives, metrics, policies, front, decisions, result, families, notes)
     _check_together(run)
     with _reading(layout.result):
         _ = run.chosen  # its confirmed score can be read
