@@ -29,12 +29,14 @@ def front_table(
     bounds: np.ndarray | None = None,
     limits: Sequence[float] | None = None,
     previous_name: str = "last choice",
+    noted: Mapping[int, str] | None = None,
 ) -> PlainTable:
     """One row for each of at least one policy, the best in objective `by` first.
 
     Scores are as people say them, with their standard deviation over the evaluation episodes; weights are those the
     policy was trained with, and gen the generation it was born in, 0 being the warm-up. What lies outside the
-    bounds [M], or does not reach the limits [M] that somebody has set, is dimmed.
+    bounds [M], or does not reach the limits [M] that somebody has set, is dimmed. `noted` is what somebody has noted
+    about policies, by id.
     """
     values = values_of(list(policies))
     stds = np.stack([policy.std for policy in policies])
@@ -46,7 +48,8 @@ def front_table(
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
         role = {policy.id == previous_id: previous_name, policy.id == chosen_id: "chosen"}.get(True)
-        notes = role, _origin(policy), _outside(bool(bounded[index]), bool(good[index]))
+        said = (noted or {}).get(policy.id)
+        notes = role, said, _origin(policy), _outside(bool(bounded[index]), bool(good[index]))
         table.add_row(
             str(policy.id),
             *(column[index] for column in scores),

@@ -27,6 +27,7 @@ from jmorl.learning.rollout import EpisodeReturns
 from jmorl.search.metrics import coverage
 from jmorl.search.policy import values_of
 from jmorl.search.prediction import COVERAGE
+from jmorl.storage.notes_file import Note
 from jmorl.storage.policy_file import policy_name
 from jmorl.storage.stored_run import StoredRun
 
@@ -36,7 +37,8 @@ def run_tables(run: StoredRun) -> list[RenderableType]:
     decisions = [decisions_table(run)] if run.decisions else []
     chosen = run.chosen  # with its confirmed score
     members = [chosen if chosen and policy.id == chosen.id else policy for policy in run.front]
-    front = front_table(members, run.objectives, chosen.id if chosen else None)
+    noted = {policy_id: _noted(note) for policy_id, note in run.notes.policies.items()}
+    front = front_table(members, run.objectives, chosen.id if chosen else None, noted=noted)
     front.title = "Final front" if run.result else "Front so far"
     tables: list[RenderableType] = [run_heading(run), metrics_table(run), *decisions, front]
     return [part for table in tables for part in (table, "")]
@@ -47,7 +49,7 @@ def run_heading(run: StoredRun) -> RenderableType:
     config, device = run.config, run.manifest["device"]
     steps, seconds = run.metrics["steps"][-1], run_seconds(run)
     rows = {
-        "run": str(run.path),
+        "run": run.notes.run.named(str(run.path)),
         "environment": config.env,
         "method": f"{config.method}, user {config.user}, seed {config.seed}",
         "population": f"{plural(config.population.agents, 'agent')}, "
@@ -60,6 +62,8 @@ def run_heading(run: StoredRun) -> RenderableType:
     result = confirmed_in_words(run.chosen, run.objectives) if run.chosen else ""
     if run.chosen and result:
         rows["result"] = f"policy {run.chosen.id}: {result}"
+    if run.notes.run.text or run.notes.problem:
+        rows["notes"] = run.notes.run.text or run.notes.problem
     held = coverage(run.policies)
     if held is not None:
         known = sum(policy.interval is not None for policy in run.policies)
@@ -68,6 +72,11 @@ def run_heading(run: StoredRun) -> RenderableType:
     for name, value in rows.items():
         grid.add_row(Text(name, "bold"), value)
     return grid
+
+
+def _noted(note: Note) -> str:
+    """Say in a few words what is noted about a policy: its name, and that it is a favourite."""
+    return ", ".join(filter(None, (f'"{note.name}"' if note.name else "", "favourite" if note.favourite else "")))
 
 
 def run_seconds(run: StoredRun) -> float:

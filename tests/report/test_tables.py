@@ -1,6 +1,7 @@
 """The tables that the commands print."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from jmorl.display.console import PlainConsole
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.report.tables import comparison_table, environment_tables, evaluation_table, run_tables
 from jmorl.search.policy import values_of
+from jmorl.storage.notes_file import Note, Notes
 
 
 def printed(renderables, width=80):
@@ -63,6 +65,20 @@ def test_the_heading_sums_the_run_up(make_run):
         "state        finished: the budget of environment steps is used up",
     ):
         assert line in text
+
+
+def test_names_stand_in_the_column_of_notes_and_the_heading_has_those_of_the_run(make_run):
+    run = make_run()
+    chosen, *others = sorted(run.front, key=lambda policy: policy.id != run.chosen.id)
+    about = {chosen.id: Note("[red]careful", favourite=True), others[0].id: Note("fast one", "Falls.")}
+    text = printed(run_tables(replace(run, notes=Notes(Note("slow way", "First\nand last."), about))), 120)
+    notes = {int(row[0]): " ".join(row) for row in section(text, "Final front")}
+    assert notes[chosen.id].endswith('chosen, "[red]careful", favourite') and notes[others[0].id].endswith('"fast one"')
+    heading = [line.rstrip() for line in text.splitlines()]
+    assert 'run          runs/made-up "slow way"' in heading
+    assert heading[heading.index("notes        First") + 1] == "             and last."
+    damaged = printed(run_tables(replace(run, notes=Notes(problem="notes.json is damaged: name"))), 120)
+    assert "notes        notes.json is damaged: name" in damaged
 
 
 def test_the_heading_says_how_good_the_forecasts_were(make_run):
