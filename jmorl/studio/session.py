@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import envs
 from jmorl.decision.answers import Answer, AnswerError, PointAnswer
@@ -56,6 +57,7 @@ class Session:
         self._worked_out: set[tuple[int, int]] = set()  # question and policy of prospects that are known, or to come
         self.leaving = False  # the run is about to be left, after its generation
         self._moving = threading.Lock()  # while one run is left for another
+        self._changing = threading.Lock()  # while the view makes way for the next one
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
         self._background = background or ThreadPoolExecutor(1, "prospects")
@@ -72,7 +74,7 @@ class Session:
         folder = continued.folder
         self._show(folder.path)
         timeline = Timeline(folder.config, self.clock())
-        self.view = replace(self.view, timeline=timeline, notes=continued.notes, result=None, reason="")
+        self._change(timeline=timeline, notes=continued.notes, result=None, reason="")
         self.leaving = False
         self._person = Person(self.ask) if folder.config.user == PERSON else None
         self._thread = threading.Thread(target=self._run, args=(continued, self._person), name="run")
@@ -83,7 +85,7 @@ class Session:
         asked = {policy.id: policy for policy in question.whole.front}
         front = tuple(asked.get(policy.id, policy) for policy in self.view.front)
         self.prospects, self._worked_out = {}, set()
-        self.view = replace(self.view, question=question, bounds=question.bounds, front=front, asking=None)
+        self._change(question=question, bounds=question.bounds, front=front, asking=None)
 
     def answer(self, question: Question, answer: Answer) -> bool:
         """Answer the open question. Return False if it is open no more. Raises ValueError if it has no such policy."""
@@ -93,13 +95,13 @@ class Session:
         """Have the person asked before the next generation, whatever their last answer was to hold for."""
         if self._person:
             self._person.ask_now()
-            self.view = replace(self.view, asking="question")
+            self._change(asking="question")
 
     def end_with(self, policy: int) -> None:
         """End the run after the generation that is going on, with this policy as its result."""
         if self._person:
             self._person.end_with(policy)
-            self.view = replace(self.view, asking="end")
+            self._change(asking="end")
 
     def work_out(self, policy: int) -> None:
         """Find out in the background what choosing the policy would mean; `prospects` has it then."""
@@ -249,7 +251,8 @@ class Session:
         try:
             with continued.folder:
                 for event in continued.events(person, early=self._show_early):
-                    self.view = after(self.view, event, self.clock())
+                    with self._changing:
+                        self.view = after(self.view, event, self.clock())
                     if self.leaving and not isinstance(event, RunFinished):
                         break
             if self.view.result:
@@ -259,18 +262,25 @@ class Session:
         except Exception as error:  # whatever it is, the page says it, and what the run had is kept
             traceback.print_exc()
             for_good = isinstance(error, LASTING)
-            self.view = replace(self.view, problem=str(error) or type(error).__name__, for_good=for_good)
+            self._change(problem=str(error) or type(error).__name__, for_good=for_good)
         finally:
-            self.view = replace(self.view, timeline=None, question=None)
+            self._change(timeline=None, question=None)
 
     def _show(self, path: Path) -> None:
         """Show what the folder has."""
         self.prospects, self._worked_out, self.dialogue = {}, set(), None
-        self.view = stored_view(path)
+        view = stored_view(path)
+        with self._changing:
+            self.view = view
+
+    def _change(self, **changes: Any) -> None:
+        """Replace the view by one with these changes, and lose none that another thread makes."""
+        with self._changing:
+            self.view = replace(self.view, **changes)
 
     def _show_early(self, agents: tuple[Policy, ...]) -> None:
         """Show agents in the middle of the warm-up."""
-        self.view = replace(self.view, front=agents)
+        self._change(front=agents)
 
     def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
         if self.view.question is not question:  # it is answered: the processors train
