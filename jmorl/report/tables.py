@@ -76,7 +76,7 @@ def run_heading(run: StoredRun) -> RenderableType:
 
 def _noted(note: Note) -> str:
     """Say in a few words what is noted about a policy: its name, and that it is a favourite."""
-    return ", ".join(filter(None, (f'"{note.name}"' if note.name else "", "favourite" if note.favourite else "")))
+    return ", ".join(filter(None, (note.quoted, "favourite" if note.favourite else "")))
 
 
 def run_seconds(run: StoredRun) -> float:

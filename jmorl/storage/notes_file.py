@@ -52,9 +52,14 @@ class Note:
     text: str = ""  # some lines
     favourite: bool = False  # of policies only
 
+    @property
+    def quoted(self) -> str:
+        """Return the name as it stands in a text: `"careful one"`; nothing without a name."""
+        return f'"{self.name}"' if self.name else ""
+
     def named(self, what: str) -> str:
         """Return what this is about with its name, if it has one: `policy 12 "careful one"`."""
-        return f'{what} "{self.name}"' if self.name else what
+        return f"{what} {self.quoted}".rstrip()
 
 
 NOTHING = Note()

@@ -7,6 +7,7 @@ from jmorl.decision.records import DecisionRecord, ScriptError, read_log
 from jmorl.storage.checkpoints import stored_generations
 from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import Manifest, read_manifest
+from jmorl.storage.notes_file import Notes, read_notes
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,17 @@ class Branch:
     steps: tuple[DecisionRecord, ...]  # its own questions, not those before it left
     checkpoints: tuple[int, ...]  # generations after which one may go on otherwise
     finished: bool
+    noted: Notes  # names, favourites and notes that somebody has given
 
     @property
     def name(self) -> str:
         """Return the name of its folder."""
         return self.path.name
+
+    @property
+    def title(self) -> str:
+        """Return the name of its folder, and the name that somebody has given it."""
+        return self.noted.run.named(self.name)
 
 
 def read_tree(path: Path) -> tuple[Branch, ...]:
@@ -67,6 +74,7 @@ def _branch(path: Path, manifest: Manifest, depth: int) -> Branch:
         tuple(record for record in _decisions(path) if record.generation > leaves_after),
         tuple(stored_generations(Layout(path).checkpoints)),
         Layout(path).result.exists(),
+        read_notes(path),
     )
 
 

@@ -19,6 +19,7 @@ from jmorl.studio.panels.keys import Keys
 from jmorl.studio.panels.limits import LimitsPanel
 from jmorl.studio.panels.lost import Lost
 from jmorl.studio.panels.navigation import NavigationPanel
+from jmorl.studio.panels.note_dialog import NoteDialog
 from jmorl.studio.panels.panel import Panel
 from jmorl.studio.panels.parallel import ParallelPanel
 from jmorl.studio.panels.policy_table import PolicyTable
@@ -56,6 +57,7 @@ class Page:
                 Keys(tab)
             with ui.element("div").classes("top"):
                 self.panels += [Introduction(tab), QuestionBar(tab), EndingDialog(tab)]
+                self.panels += [NoteDialog(tab)]
             with ui.element("div").classes("charts"):
                 self.panels += [FrontPanel(tab), ParallelPanel(tab)]
             with ui.element("div").classes("side"):

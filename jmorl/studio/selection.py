@@ -24,6 +24,7 @@ class Selection:
     than: int | None = None  # the policy that the others are to be better than; None: all are, in order
     prospects: Mapping[int, Prospect] = field(default_factory=dict)  # policy -> what choosing it would mean, if known
     limits: tuple[float, ...] | None = None  # [M] what each objective must reach, -inf: anything; None: never said
+    favourites: bool = False  # only favourites are listed, those that are no longer in the front, too
 
     @property
     def letters(self) -> dict[int, str]:
@@ -71,17 +72,22 @@ def wanted(view: View, selection: Selection) -> list[int] | None:
 
 def reaching(view: View, selection: Selection) -> np.ndarray:
     """Return which policies of the front reach the limits that somebody has set, [N] bool."""
-    least = np.full(len(view.objectives), -np.inf) if selection.limits is None else np.array(selection.limits)
-    return within(view.values, least)
+    return within(view.values, _least(view, selection))
 
 
 def listed(view: View, selection: Selection) -> list[int] | None:
-    """Return the policies to look along: those with more of what is asked for, within the limits; None: all are."""
-    more, reach = wanted(view, selection), reaching(view, selection)
-    if more is None and reach.all():
+    """Return the policies to look along: with more of what is asked for, within the limits; None: all of the front.
+
+    Where only favourites are listed, those that are no longer in the front are among them, as long as no more of an
+    objective is asked for.
+    """
+    policies = view.favourites if selection.favourites else view.front
+    values = np.array([policy.values for policy in policies]).reshape(-1, len(view.objectives))
+    more, reach = wanted(view, selection), within(values, _least(view, selection))
+    if more is None and reach.all() and not selection.favourites:
         return None
-    within_limits = [policy.id for policy, reaches in zip(view.front, reach, strict=True) if reaches]
-    return within_limits if more is None else [policy for policy in more if policy in within_limits]
+    kept = [policy.id for policy, reaches in zip(policies, reach, strict=True) if reaches]
+    return kept if more is None else [policy for policy in more if policy in kept]
 
 
 def to_begin_with(view: View, axes: tuple[int, int]) -> Selection:
@@ -118,6 +124,11 @@ def last_choice(view: View) -> Policy | None:
     scale = core_scale(view.values)
     distance = np.linalg.norm(scale.apply(view.values) - scale.apply(previous.values), axis=1)
     return view.front[int(np.where(better | ~better.any(), distance, np.inf).argmin())]
+
+
+def _least(view: View, selection: Selection) -> np.ndarray:
+    """Return what each objective must reach, [M]."""
+    return np.full(len(view.objectives), -np.inf) if selection.limits is None else np.array(selection.limits)
 
 
 def _compromise(policies: Sequence[Policy]) -> Policy:

@@ -29,6 +29,7 @@ from jmorl.search.policy import Policy
 from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
+from jmorl.storage.notes_file import change_note, read_notes
 from jmorl.storage.policy_file import PolicyFileError, StoredPolicy, load_policy, save_policy
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
@@ -58,6 +59,7 @@ class Session:
         self.leaving = False  # the run is about to be left, after its generation
         self._moving = threading.Lock()  # while one run is left for another
         self._changing = threading.Lock()  # while the view makes way for the next one
+        self._noting = threading.Lock()  # while a file of notes is read and written
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
         self._background = background or ThreadPoolExecutor(1, "prospects")
@@ -113,6 +115,19 @@ class Session:
     def history(self) -> tuple[Branch, ...]:
         """Read the run that is open, and its branches."""
         return read_tree(self.view.path)
+
+    def note(self, run: str, policy: int | None, **changes: Any) -> bool:
+        """Change what is noted about a policy of a run in the history, or about the run; see `change_note`.
+
+        Return True. Raises ValueError where there is no such run or policy, and as `change_note` does.
+        """
+        path = self._in_history(run).path
+        if policy is not None and not Layout(path).policy(policy).is_file():
+            raise ValueError(f"there is no policy {policy} in this run")
+        with self._noting:
+            change_note(path, policy, **changes)
+            self._change(noted=read_notes(self.view.path))
+        return True
 
     def step_back(self, run: str, generation: int) -> None:
         """Ask the question before `generation` of a run in the history again: a branch begins there, and is driven.
@@ -269,9 +284,10 @@ class Session:
     def _show(self, path: Path) -> None:
         """Show what the folder has."""
         self.prospects, self._worked_out, self.dialogue = {}, set(), None
-        view = stored_view(path)
-        with self._changing:
-            self.view = view
+        with self._noting:
+            view = stored_view(path)
+            with self._changing:
+                self.view = view
 
     def _change(self, **changes: Any) -> None:
         """Replace the view by one with these changes, and lose none that another thread makes."""

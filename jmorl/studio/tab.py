@@ -16,9 +16,11 @@ from jmorl.decision.answers import Answer, PointAnswer
 from jmorl.decision.protocol import PointQuestion, Question
 from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
+from jmorl.storage.notes_file import Note
 from jmorl.studio import texts
 from jmorl.studio.between import BlendScore
 from jmorl.studio.dialogue import Dialogue
+from jmorl.studio.history import Branch
 from jmorl.studio.selection import Selection, last_choice, listed, to_begin_with
 from jmorl.studio.session import Session
 from jmorl.studio.view import View
@@ -33,6 +35,16 @@ class Ending:
 
     question: Question | None  # that it answers; None between two questions
     policies: tuple[int, ...]  # any of which may become the result
+
+
+@dataclass(frozen=True, eq=False)
+class Editing:
+    """A name and a note that somebody is writing."""
+
+    run: str  # id of the run that it is about
+    policy: int | None  # of that run; None: it is about the run itself
+    subject: str  # what it is about, in words
+    before: Note  # as it was when they began
 
 
 class Tab:
@@ -54,12 +66,14 @@ class Tab:
         self.kept = {} if kept is None else kept
         self.selection = Selection()
         self.ending: Ending | None = None  # that somebody is asked to confirm
+        self.editing: Editing | None = None
         self.axes = (0, 1)  # objectives of the chart of points: to the right, and upwards
         self.side = texts.POLICIES  # title of the panel that is open at the side
         self.covered = False  # by a dialog, which takes all keys
         self.generations = 1  # to go on for after the answer, before the next question
         self._settled: Question | None = None  # a question that whoever sits here knows to be answered
         self._limited = False  # limits were set here since the last answer
+        self._told = ""  # what was wrong with the notes
         self.show, self.tell = show, tell
         place, selection = self.kept.get("selection", (None, None))
         if place == self._place:
@@ -109,6 +123,10 @@ class Tab:
             self._lay_out(self.selection.with_policy(led_to.id))
         if self.session.prospects is not self.selection.prospects:
             self.selection = replace(self.selection, prospects=self.session.prospects)
+        if view.noted.problem != self._told:
+            self._told = view.noted.problem
+            if self._told:
+                self.tell(texts.NOTES_PROBLEM.format(problem=self._told), "failure")
         self.show()
 
     def choose(self, policy: int) -> None:
@@ -214,7 +232,7 @@ class Tab:
     def look_along(self, step: int) -> None:
         """Look at the next policy of those shown, in the order of the objective to the right in the chart."""
         kept = listed(self.view, self.selection)
-        shown = [policy for policy in self.view.front if kept is None or policy.id in kept]
+        shown = self.view.front if kept is None else tuple(filter(None, map(self.view.policy, kept)))
         order = [policy.id for policy in sorted(shown, key=lambda policy: float(policy.values[self.axes[0]]))]
         if order:
             focus = self.selection.focus
@@ -236,6 +254,39 @@ class Tab:
         wanted_now = None if self.selection.more_of == objective else objective
         self._lay_out(replace(self.selection, more_of=wanted_now, than=than))
         self.show()
+
+    def list_favourites(self, only: bool) -> None:
+        """List favourites only, those that are no longer in the front among them; or the whole front again."""
+        self._lay_out(replace(self.selection, favourites=only))
+        self.show()
+
+    async def favour(self, policy: int) -> None:
+        """Make a policy a favourite, or one no longer."""
+        favourite = not self.view.noted.policy(policy).favourite
+        await self._in_background(self.session.note, self.view.run, policy, favourite=favourite)
+
+    def edit_policy(self, policy: int) -> None:
+        """Begin to write the name and the note of a policy."""
+        self._edit(Editing(self.view.run, policy, f"policy {policy}", self.view.noted.policy(policy)))
+
+    def edit_run(self, branch: Branch) -> None:
+        """Begin to write the name and the note of a run in the history."""
+        self._edit(Editing(branch.run, None, branch.name, branch.noted.run))
+
+    async def save_note(self, name: str, text: str) -> None:
+        """Keep the name and the note that somebody has written, and nothing that they have not changed."""
+        editing = self.editing
+        if editing is None:
+            return
+        now, before = {"name": name, "text": text}, {"name": editing.before.name, "text": editing.before.text}
+        changes = {field: value for field, value in now.items() if value != before[field]}
+        kept = await self._in_background(self.session.note, editing.run, editing.policy, **changes)
+        if kept and self.editing is editing:
+            self._edit(None)
+
+    def stop_editing(self) -> None:
+        """Keep nothing of what is being written."""
+        self._edit(None)
 
     def turn_axes(self, axes: tuple[int, int]) -> None:
         """Show other objectives in the chart of points."""
@@ -298,11 +349,17 @@ class Tab:
         self.ending = Ending(self.view.question, policies)
         self.show()
 
-    async def _in_background(self, command: Callable[..., Result], *arguments: object) -> Result | None:
+    def _edit(self, editing: Editing | None) -> None:
+        self.editing = editing
+        self.show()
+
+    async def _in_background(
+        self, command: Callable[..., Result], *arguments: object, **named: object
+    ) -> Result | None:
         """Run a command that takes a while, during which the page goes on. Tell why it failed, if it does."""
         result = None
         try:
-            result = await run.io_bound(command, *arguments)
+            result = await run.io_bound(command, *arguments, **named)
         except (ValueError, OSError, CheckpointError, ComputationFailed) as error:
             self.tell(str(error), "failure")
         self.follow()

@@ -1,5 +1,6 @@
 """The texts of the page."""
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import accumulate
 
@@ -11,6 +12,7 @@ from jmorl.display.text import duration, front_question, minus, plural, short_co
 from jmorl.report.timeline import Timeline
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
+from jmorl.storage.notes_file import LONGEST_NAME, LONGEST_TEXT
 from jmorl.studio.between import EPISODES, BlendScore
 from jmorl.studio.selection import LETTERS, Selection, last_choice, reaching, wanted
 from jmorl.studio.view import PERSON, View
@@ -55,6 +57,11 @@ NONE_REACHES = "None of them reaches your limits."
 LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
 SCORING = "Scoring …"
+REPLACED = "No longer in the front: a later policy is better in everything"
+NAME, NOTE = "Name", "Note"
+NOTES_PROBLEM = "Names and notes cannot be shown: {problem}"
+NOTE_HINT = f"A name has {LONGEST_NAME} characters at most, a note {LONGEST_TEXT:,}. They are kept with the run."
+SHORT = 18  # characters of a name, in the line of the question
 SURELY = 3  # standard errors that a score must lie behind another to be called worse
 MOST_POINTS, LONGEST_POINTS = 3, 150  # that the prediction model is quoted with, and their characters
 KEYS = (
@@ -63,6 +70,7 @@ KEYS = (
     ("1 2 …", "what is better in objective 1, 2, …; once more: all policies"),
     ("=", "of two policies that are asked about, like one as much as the other"),
     ("c", "choose the policy in focus"),
+    ("f", "make the policy in focus a favourite, or one no longer"),
     ("k", "keep the last choice"),
     ("x", "put the policy in focus away"),
     ("space", "stop and start the playback"),
@@ -131,7 +139,7 @@ def heading(view: View, selection: Selection) -> str:
     question, more = view.question, wanted(view, selection)
     if more is not None and selection.more_of is not None and selection.than is not None:
         label = view.objectives[selection.more_of].label
-        return f"{plural(len(more), 'policy')} better in {label} than policy {selection.than}"
+        return f"{plural(len(more), 'policy')} better in {label} than {policy_name(view, selection.than, SHORT)}"
     if question:
         purpose, generation, form, again = question.purpose, question.generation, question.form, question.again
         asked = front_question(purpose, generation, len(question.front), form, again)
@@ -140,7 +148,7 @@ def heading(view: View, selection: Selection) -> str:
         return asked if reaching(view, selection).any() else f"{asked} {NONE_REACHES}"
     if view.result:
         values = minus(values_in_words(view.result.values, writers_of(view)))
-        return f"The result is policy {view.result.id}: {values}"
+        return f"The result is {policy_name(view, view.result.id, SHORT)}: {values}"
     if view.problem:
         then = GOING_ON_FAILS if view.for_good else PUT_RIGHT
         return f"Training has stopped: {view.problem.rstrip('.')}. {KEPT} {then}"
@@ -155,7 +163,8 @@ def heading(view: View, selection: Selection) -> str:
     if view.asking == "end":
         return END_LATER
     if view.stand_in and view.previous:
-        return f"Policy {view.previous.id} was chosen for you: {view.stand_in}."
+        name = policy_name(view, view.previous.id, SHORT)
+        return f"{name[0].upper()}{name[1:]} was chosen for you: {view.stand_in}."
     unless = "" if view.asking or view.config.ask == "always" else ", unless your answers leave no doubt"
     if view.rounds_to_question > 1:
         return f"You are asked again in {view.rounds_to_question} rounds{unless}."
@@ -165,6 +174,24 @@ def heading(view: View, selection: Selection) -> str:
 def lost(view: View) -> str:
     """Say that the studio is gone, and what to do."""
     return LOST.format(command=command("studio", view.path))
+
+
+def policy_name(view: View, policy_id: int, longest: int = LONGEST_NAME) -> str:
+    """Return the number of a policy, and the name that somebody has given it, cut where it is longer than that."""
+    note = view.noted.policy(policy_id)
+    cut = note if len(note.name) <= longest else replace(note, name=f"{note.name[: longest - 1].rstrip()}…")
+    return cut.named(f"policy {policy_id}")
+
+
+def subject(what: str) -> str:
+    """Return the title of the dialog for the name and the note of a policy or a run."""
+    return f"Name and note of {what}"
+
+
+def remarks(view: View, policy: Policy) -> str:
+    """Say in the table what else there is to know of a policy: its name, and that it is no longer in the front."""
+    replaced = "no longer in the front" if policy.id in view.replaced else ""
+    return ", ".join(filter(None, (view.noted.policy(policy.id).name, replaced)))
 
 
 def introduction(view: View) -> str:
@@ -192,8 +219,8 @@ def keep(view: View) -> str:
     if last is None or view.previous is None or not view.choosable(last.id):
         return ""
     if last.id == view.previous.id:
-        return f"Keep policy {last.id}"
-    return f"Take policy {last.id}, which has replaced {view.previous.id}"
+        return f"Keep {policy_name(view, last.id, SHORT)}"
+    return f"Take {policy_name(view, last.id, SHORT)}, which has replaced {view.previous.id}"
 
 
 def offers_equal(view: View) -> bool:
@@ -202,9 +229,9 @@ def offers_equal(view: View) -> bool:
 
 
 def end_with(view: View, selection: Selection, policy: Policy) -> str:
-    """Name a way to end the run: with which policy, by letter, number and scores."""
+    """Name a way to end the run: with which policy, by letter, number, name and scores."""
     letter = selection.letters.get(policy.id)
-    name = f"{letter}, policy {policy.id}" if letter else f"policy {policy.id}"
+    name = f"{letter}, {policy_name(view, policy.id)}" if letter else policy_name(view, policy.id)
     return f"End with {name}: {minus(values_in_words(policy.values, writers_of(view)))}"
 
 
@@ -293,7 +320,9 @@ def _with_units(view: View, values: np.ndarray, deviations: np.ndarray) -> list[
 def remark(view: View, policy: Policy) -> str:
     """Say where a policy comes from, that it cannot be chosen, or how far its scores can be trusted as the result's."""
     if view.question and not view.choosable(policy.id):
-        return "No longer in the front: a later policy is better in everything, so it cannot be chosen"
+        return f"{REPLACED}, so it cannot be chosen"
+    if policy.id in view.replaced:
+        return REPLACED
     if view.result or (view.question and view.question.purpose == "final"):
         return _certainty(view, policy)
     if view.early:

@@ -3,7 +3,8 @@
 The thread of the run makes it, the page reads it; neither waits for the other.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -23,6 +24,7 @@ from jmorl.search.policy import Policy, values_of
 from jmorl.state import RunState
 from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import read_manifest
+from jmorl.storage.notes_file import Notes, read_notes
 from jmorl.storage.stored_run import StoredRun, read_run
 from jmorl.units import measured_in
 
@@ -67,6 +69,8 @@ class View:
     stand_in: str = ""  # why the last choice was made by a stand-in; nothing if it was the person's own
     answered: int | None = None  # generation of the last question that the person answered themselves
     notes: tuple[str, ...] = ()  # what somebody should know about it, sentences
+    replaced: Mapping[int, Policy] = field(default_factory=dict)  # id -> policy that was in the front once, no network
+    noted: Notes = Notes()  # names, favourites and notes that somebody has given
 
     @cached_property
     def values(self) -> np.ndarray:  # [N, M]
@@ -76,7 +80,12 @@ class View:
     def policy(self, policy_id: int) -> Policy | None:
         """Return a policy that can be looked at, if it is there."""
         known = (*self.front, *filter(None, (self.previous, self.result)))
-        return next((policy for policy in known if policy.id == policy_id), None)
+        return next((policy for policy in known if policy.id == policy_id), self.replaced.get(policy_id))
+
+    @cached_property
+    def favourites(self) -> tuple[Policy, ...]:
+        """Return the favourites that can be looked at, by id; some may have been replaced in the front."""
+        return tuple(policy for policy in map(self.policy, self.noted.favourites) if policy)
 
     @property
     def early(self) -> bool:
@@ -113,15 +122,18 @@ def stored_view(path: Path) -> View:
     """Return what a run folder has to show; of a run that is in its warm-up nothing yet. Raises as `read_run` does."""
     manifest, config = read_manifest(path), resolve(file=Layout(path).config)
     objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
-    nothing = View(path, manifest["run"], config, objectives, (), (), np.full(len(objectives), -np.inf), None, (), None)
+    unbounded = np.full(len(objectives), -np.inf)
+    nothing = View(path, manifest["run"], config, objectives, (), (), unbounded, None, (), None, noted=read_notes(path))
     if not Layout(path).metrics.exists():
         return nothing
     stored = read_run(path)
     decisions = [record for record in stored.decisions if isinstance(record, DecisionRecord)]
+    archives = _archives(stored)
     return replace(
         nothing,
-        generations=_generations(stored),
+        generations=_generations(stored, archives),
         front=_with(stored.front, stored.chosen) if stored.chosen else stored.front,
+        replaced=_replaced([policy for archive in archives for policy in archive.members], stored.front),
         bounds=stored.bounds[-1],
         previous=stored.policies[decisions[-1].policy] if decisions else None,
         choices=tuple((record.generation, np.array(record.values)) for record in decisions),
@@ -146,7 +158,8 @@ def after(view: View, event: Event, now: float) -> View:
             front = state.archive.members
             values, metrics = values_of(front), event.front
             over = Generation(state.generation, values, event.steps, metrics.hypervolume, event.utility_max)
-            return replace(view, state=state, generations=(*view.generations, over), front=front)
+            replaced = {} if view.early else {**view.replaced, **_replaced(view.front, front)}
+            return replace(view, state=state, generations=(*view.generations, over), front=front, replaced=replaced)
         case Decided(chosen=Policy() as chosen):
             choices = (*view.choices, (event.question.generation, chosen.values))
             asked, generation = event.question.was_asked(event.answer), event.question.generation
@@ -171,12 +184,26 @@ def _reason(event: Decided) -> str:
     return str(getattr(event.answer, "reason", "")) or UNRECORDED
 
 
-def _generations(stored: StoredRun) -> tuple[Generation, ...]:
+def _replaced(once: Iterable[Policy], front: tuple[Policy, ...]) -> dict[int, Policy]:
+    """Return those that were in a front once and are in it no more, without their networks, by id."""
+    here = {policy.id for policy in front}
+    return {policy.id: replace(policy, snapshot=None) for policy in once if policy.id not in here}
+
+
+def _archives(stored: StoredRun) -> list[Archive]:
+    """Return the archive after each generation of a stored run: of all policies evaluated by then."""
+    archives = [Archive()]
+    for number in range(len(stored.metrics["generation"])):
+        offspring = [policy for policy in stored.policies if policy.generation == number]
+        archives.append(archives[-1].offer(offspring))
+    return archives[1:]
+
+
+def _generations(stored: StoredRun, archives: Sequence[Archive]) -> tuple[Generation, ...]:
     """Return the generations of a stored run; the front of each is that of all policies evaluated by then."""
-    archive, generations = Archive(), []
+    generations = []
     metrics = stored.metrics
-    for number in range(len(metrics["generation"])):
-        archive = archive.offer([policy for policy in stored.policies if policy.generation == number])
+    for number, archive in enumerate(archives):
         utility = float(metrics["utility_max"][number])
         generations.append(
             Generation(

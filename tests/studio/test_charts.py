@@ -13,6 +13,7 @@ from jmorl.decision.protocol import Question
 from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Confirmation, Policy
+from jmorl.storage.notes_file import Note, Notes
 from jmorl.studio import dialogue, texts
 from jmorl.studio.charts.curves import curve_options
 from jmorl.studio.charts.front_chart import front_marks, front_options
@@ -209,6 +210,37 @@ def test_lines_say_which_policy_they_are(view):
     assert "p.data[objectives.length]" in formatter
 
 
+def test_tooltips_have_the_names_that_policies_were_given(view):
+    noted = Notes(policies={9: Note("careful one"), 2: Note("</b>"), 5: Note(favourite=True)})
+    named = replace(view, noted=noted, front=(*view.front, policy(6, (-75.0, -30.0)), policy(7, (-900.0, -25.0))))
+    shown = series(
+        front_options(replace(named, noted=replace(noted, policies={**noted.policies, 7: Note("stray")})), (0, 1), None)
+    )
+    notes = {point[0]: point[3] for name in ("within", "outside") for point in shown[f"{name} the bounds"]["data"]}
+    outside = "outside the search area"
+    assert notes == {4: "", 9: '"careful one"', 2: f'"</b>", {outside}', 5: outside, 6: ""}
+    assert shown["far out"]["data"][0]["value"][3] == '"stray", far out'
+    lines = series(parallel_options(named))
+    assert [line[2:] for line in lines["within the bounds"]["data"]] == [[4, ""], [9, '"careful one"'], [6, ""]]
+    assert [line[2:] for line in lines["outside the bounds"]["data"]][:2] == [[2, '"</b>"'], [5, ""]]
+
+
+def test_texts_name_policies_as_somebody_has(view):
+    named = replace(view, noted=Notes(policies={4: Note("careful one"), 2: Note("fast one")}))
+    assert texts.keep(named) == 'Keep policy 4 "careful one"'
+    long = replace(view, noted=Notes(policies={4: Note("careful one that never slips")}))
+    assert texts.keep(long) == 'Keep policy 4 "careful one that…"'  # there is little room for it
+    assert "slips" in texts.end_with(long, Selection(), view.front[0])
+    selection = Selection(more_of=0, than=4)
+    assert texts.heading(named, selection) == '2 policies better in time than policy 4 "careful one"'
+    ended = replace(named, question=None, result=view.front[2], timeline=None)
+    assert texts.heading(ended, Selection()).startswith('The result is policy 2 "fast one": time ')
+    person = resolve(overrides={"user": "terminal"})
+    between = replace(named, question=None, stand_in="it is clear", config=person)
+    assert texts.heading(between, Selection()) == 'Policy 4 "careful one" was chosen for you: it is clear.'
+    assert texts.end_with(named, Selection(), view.front[2]).startswith('End with policy 2 "fast one": time ')
+
+
 def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
     expected = np.array([[-65.0, -30.0], [-75.0, -15.0]])
     prospect = Prospect(np.array([-75.0, -42.0]), np.array([False, True, False, False]), expected, odds=0.3)
@@ -238,7 +270,7 @@ def test_what_a_choice_would_bring_is_drawn_for_the_policy_in_focus(view):
 
 def test_lines_across_the_axes_have_the_values_of_the_policies(view):
     shown = series(parallel_options(view)) | series(parallel_marks(view, Selection().with_policy(2)))
-    assert {line[-1]: tuple(line[:-1]) for line in shown["within the bounds"]["data"]} == {
+    assert {line[2]: tuple(line[:2]) for line in shown["within the bounds"]["data"]} == {
         number: VALUES[number] for number in (4, 9)
     }
     assert shown["bounds"]["data"] == [[-82.0, -45.0]]

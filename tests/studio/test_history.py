@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from jmorl.storage.notes_file import change_note
 from jmorl.storage.resume import branch
 from jmorl.studio.history import free_folder, read_tree
 
@@ -53,3 +54,11 @@ def test_a_free_folder_is_named_after_the_first_run(runs):
     assert free_folder(runs / "aa") == runs / "first-2"
     (runs / "first-2").mkdir()
     assert free_folder(runs / "first") == runs / "first-3"
+
+
+def test_a_branch_has_the_name_that_it_was_given_beside_that_of_its_folder(runs):
+    change_note(runs / "a", None, name="<b>slow</b>", text="With little fuel.")
+    (runs / "b" / "notes.json").write_text("[")
+    tree = {each.name: each for each in read_tree(runs / "first")}
+    assert tree["a"].title == 'a "<b>slow</b>"' and tree["a"].noted.run.text == "With little fuel."
+    assert tree["aa"].title == "aa" and "notes.json is not valid JSON" in tree["b"].noted.problem

@@ -11,6 +11,7 @@ from jmorl.decision.answers import Answer, Choose
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.search.policy import values_of
 from jmorl.storage.afterwards import choose_afterwards
+from jmorl.storage.notes_file import Note
 from jmorl.storage.resume import Continued, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
@@ -346,3 +347,61 @@ def test_what_breaks_a_run_off_is_said(person_config, make_session, tmp_path, mo
     continued = resume(session.view.path)
     continued.folder.close()
     assert continued.state is None
+
+
+def test_notes_are_kept_while_the_run_goes_on_and_no_change_of_either_is_lost(session):
+    question = session.question()
+    run, policies = session.view.run, [policy.id for policy in question.front]
+    session.answer(question, Answer(policies[0], generations=3))
+    for name in map(str, range(20)):
+        for policy in policies:
+            session.note(run, policy, name=name, favourite=True)
+    question = session.question()
+    assert [generation.number for generation in session.view.generations] == [0, 1, 2, 3]
+    assert session.view.question is question
+    assert {policy: note.name for policy, note in session.view.noted.policies.items()} == dict.fromkeys(policies, "19")
+    assert session.view.noted == read_run(session.view.path).notes
+
+
+def test_a_run_that_has_ended_can_be_noted_and_stays_as_it_is(session, make_session):
+    answer_all(session)
+    path, before = session.view.path, outcome(session.view.path)
+    session.note(session.view.run, session.view.result.id, name="the one", favourite=True)
+    assert session.view.result and session.view.noted.policy(session.view.result.id).name == "the one"
+    session.close()
+    later = make_session()
+    later.open(path)
+    assert later.view.noted == session.view.noted and later.view.result.id == session.view.result.id
+    after = outcome(path)
+    assert after[0] - before[0] == {"notes.json"} and after[1:] == before[1:]
+
+
+def test_only_what_is_in_the_history_can_be_noted(session):
+    question = session.question()
+    for run, policy, message in (
+        ("../elsewhere", None, "no run of this history"),
+        (session.view.run, 9999, "there is no policy 9999"),
+        (session.view.run, -1, "there is no policy -1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            session.note(run, policy, name="x")
+    assert not (session.view.path / "notes.json").exists() and session.view.question is question
+
+
+def test_a_branch_begins_with_the_notes_about_what_it_shares(session):
+    question = session.question()
+    first, run = question.front[0].id, session.view.run
+    session.note(run, first, name="careful one", favourite=True)
+    session.note(run, None, name="the first way")
+    session.answer(question, Answer(first))
+    question = session.question()
+    later = next(policy.id for policy in question.front if policy.generation == 1)
+    session.note(run, later, favourite=True)
+    session.step_back(run, 1)
+    session.question()
+    assert session.view.noted.policies == {first: Note("careful one", favourite=True)}
+    assert not session.view.noted.run.name
+    session.note(session.view.run, first, name="slow one")
+    session.switch(run)
+    session.question()
+    assert session.view.noted.policy(first).name == "careful one" and session.view.noted.favourites == [first, later]

@@ -411,3 +411,111 @@ def test_a_blend_of_a_policy_that_is_not_there_is_told_of(watching, question):
     tab = watching.tab
     assert asyncio.run(tab.score_between(tab.view.run, question.front[0].id, 99999, 50)) is None
     assert watching.said == [("failure", "there is no file of policy 99999")]
+
+
+def favour(tab, *policies):
+    for policy in policies:
+        asyncio.run(tab.favour(policy))
+
+
+def test_what_is_noted_in_one_tab_appears_in_the_other(session, question, watching):
+    tab, other = watching.tab, Watching(session).tab
+    policy = question.front[0]
+    lay_out(other, policy.id)
+    favour(tab, policy.id)
+    tab.edit_policy(policy.id)
+    other.edit_policy(policy.id)  # before the first has kept anything
+    asyncio.run(tab.save_note("careful one", "Never slips."))
+    assert tab.editing is None and not watching.said
+    other.follow()
+    note = other.view.noted.policy(policy.id)
+    assert (note.name, note.text, note.favourite) == ("careful one", "Never slips.", True)
+    asyncio.run(other.save_note("", "Brakes."))  # whose name they have not touched
+    tab.follow()
+    note = tab.view.noted.policy(policy.id)
+    assert (note.name, note.text, note.favourite) == ("careful one", "Brakes.", True)
+    named = f'policy {policy.id} "careful one"'
+    assert texts.end_with(other.view, other.selection, policy).startswith(f"End with A, {named}: north ")
+    assert texts.remarks(tab.view, policy) == "careful one"
+    favour(tab, policy.id)
+    assert not tab.view.favourites and tab.view.noted.policy(policy.id).name
+
+
+def test_what_is_too_long_stays_written_and_is_told_once(question, watching):
+    tab = watching.tab
+    asyncio.run(tab.save_note("nobody", ""))  # nothing is being written
+    tab.edit_policy(question.front[0].id)
+    asyncio.run(tab.save_note("n" * 41, "t" * 2001))
+    assert len(watching.said) == 1 and watching.said[0][0] == "failure"
+    assert "41 characters" in watching.said[0][1] and "2,001 characters" in watching.said[0][1]
+    assert tab.editing and not tab.view.noted.policies
+    tab.stop_editing()
+    assert tab.editing is None
+    tab.edit_policy(99)
+    asyncio.run(tab.save_note("nobody", ""))
+    assert watching.said[1:] == [("failure", "there is no policy 99 in this run")]
+
+
+def test_favourites_are_listed_those_that_were_replaced_too(session, question, watching):
+    tab = watching.tab
+    gone, *left = question.front
+    everything = sorted(policy.id for policy in question.front)
+    favour(tab, *everything)
+    session.view = replace(
+        session.view,
+        front=tuple(left),
+        replaced={gone.id: replace(gone, snapshot=None)},
+        question=replace(question, front=tuple(left)),
+    )
+    tab.follow()
+    assert [policy.id for policy in tab.view.favourites] == everything
+    assert listed(tab.view, tab.selection) is None
+    tab.list_favourites(True)
+    assert listed(tab.view, tab.selection) == everything
+    tab.look_along(-99)
+    assert tab.selection.focus == order(question.front, 0)[0]
+    tab.look_at(gone.id)
+    assert tab.selection.focus == gone.id and not watching.said
+    shown = tab.view.policy(gone.id)
+    assert texts.remarks(tab.view, shown) == "no longer in the front" and texts.remark(tab.view, shown).endswith(
+        "a later policy is better in everything, so it cannot be chosen"
+    )
+    tab.choose(gone.id)
+    assert watching.said == [("hint", f"Policy {gone.id} is not among those you can choose from.")]
+    tab.limit(0, float(gone.values[0]) + 1e-6)
+    assert gone.id not in listed(tab.view, tab.selection)
+    tab.limit(0, None)
+    favour(tab, left[0].id)
+    assert listed(tab.view, tab.selection) == [policy for policy in everything if policy != left[0].id]
+    tab.more_of(1)
+    assert set(listed(tab.view, tab.selection)) <= {policy.id for policy in left[1:]}
+    tab.more_of(1)
+    favour(tab, gone.id)
+    assert tab.selection.focus == gone.id  # what is laid out stays until it is put away
+    tab.list_favourites(False)
+    assert listed(tab.view, tab.selection) is None
+    ended = replace(tab.view, question=None)
+    assert texts.remark(ended, shown) == texts.REPLACED and texts.remark(ended, left[0]) == "trained in the warm-up"
+
+
+def test_damaged_notes_are_told_of_and_the_page_goes_on(session, question, watching):
+    tab, path = watching.tab, session.view.path / "notes.json"
+    path.write_text("{")
+    favour(tab, question.front[0].id)
+    (tone, told), *more = watching.said
+    assert tone == "failure" and "notes.json is not valid JSON" in told and not more
+    session.close()
+    later = type(session)()
+    try:
+        later.open(session.view.path)
+        later.question()
+        watching = Watching(later)
+        watching.tab.follow()
+        watching.tab.follow()
+        (tone, told), *more = watching.said
+        assert tone == "failure" and told.startswith("Names and notes cannot be shown: ") and not more
+        path.unlink()
+        favour(watching.tab, question.front[0].id)
+        assert [policy.id for policy in watching.tab.view.favourites] == [question.front[0].id]
+    finally:
+        later.close()

@@ -26,13 +26,14 @@ TOOLTIP_TEXT = """
   return [`policy ${p.value[0]}`, ...values, p.value[objectives.length + 1]].filter(Boolean).join("\\n");
 }
 """
-# The same for lines of parallel coordinates, [values..., policy].
+# The same for lines of parallel coordinates, [values..., policy, name].
 LINE_TOOLTIP = """
 (p) => {
   const objectives = %s;
   const number = (v) => (v + 0).toLocaleString("en", { maximumSignificantDigits: 5 }).replace("-", "−");
   const values = objectives.map(([label, scale], i) => `${label}  ${number(p.data[i] * scale)}`);
-  return [`policy ${p.data[objectives.length]}`, ...values].join("\\n");
+  const policy = `policy ${p.data[objectives.length]} ${p.data[objectives.length + 1]}`;
+  return [policy, ...values].join("\\n");
 }
 """
 INTERVALS = 5  # between the numbers along an axis, about

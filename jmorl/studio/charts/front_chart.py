@@ -146,7 +146,7 @@ def _members(view: View, axes: tuple[int, int], limits: np.ndarray, within_bound
     """Draw the members of the front within the bounds, or those outside them, as far as the chart reaches."""
     kept = (within(view.values, view.bounds) == within_bounds) & _in_chart(view.values, axes, limits)
     data = [
-        [policy.id, *values, "" if within_bounds else "outside the search area"]
+        [policy.id, *values, _note(view, policy, "" if within_bounds else "outside the search area")]
         for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
         if shown
     ]
@@ -179,7 +179,7 @@ def _far_out(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str,
         position = {-1: "right", 1: "left"}.get(beyond[0]) or {-1: "top", 1: "bottom"}[beyond[1]]
         data.append(
             {
-                "value": _clipped(policy, axes, limits, "far out"),
+                "value": _clipped(policy, axes, limits, _note(view, policy, "far out")),
                 "symbolRotate": round(float(np.degrees(np.arctan2(-beyond[0], beyond[1])))),
                 "label": {"formatter": ", ".join(told), "position": position},
             }
@@ -198,6 +198,11 @@ def _far_out(view: View, axes: tuple[int, int], limits: np.ndarray) -> dict[str,
         clip=False,
         z=5,
     )
+
+
+def _note(view: View, policy: Policy, place: str) -> str:
+    """Return what stands below the values of a policy: the name that somebody has given it, and where it lies."""
+    return ", ".join(filter(None, (view.noted.policy(policy.id).quoted, place)))
 
 
 def _in_chart(values: np.ndarray, axes: tuple[int, int], limits: np.ndarray) -> np.ndarray:

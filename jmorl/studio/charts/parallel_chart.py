@@ -30,7 +30,7 @@ LINE = 12  # pixels
 
 
 def parallel_options(view: View) -> dict[str, Any]:
-    """Draw what stays while policies are looked at; up is better on every axis. Lines are [values..., policy]."""
+    """Draw what stays while policies are looked at; up is better on every axis. Lines are [values..., policy, name]."""
     inside = within(view.values, view.bounds)
     return {
         **_frame(view, visible=True),
@@ -111,7 +111,7 @@ def _bounded(view: View) -> bool:
 
 def _lines(name: str, view: View, kept: np.ndarray, colour: str) -> dict[str, Any]:
     data = [
-        [*values, policy.id]
+        [*values, policy.id, view.noted.policy(policy.id).quoted]
         for policy, values, shown in zip(view.front, plain(view.values), kept, strict=True)
         if shown
     ]

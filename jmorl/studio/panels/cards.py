@@ -58,6 +58,12 @@ class Card:
         with ui.element("div").classes("card-head"):
             ui.label(letter).classes(f"letter mark-{letter}")
             ui.label(f"policy {policy.id}").classes("card-title")
+            self.star = ui.button(on_click=lambda: tab.favour(policy.id)).props(
+                f'flat dense round size=xs aria-label="favourite: policy {policy.id}"'
+            )
+            self.edit = ui.button(on_click=lambda: tab.edit_policy(policy.id)).props(
+                f'flat dense round size=xs aria-label="name and note of policy {policy.id}"'
+            )
             address = f"/policies/{view.run}/{policy.id}.npz"
             if not view.early:
                 ui.button(icon="download", on_click=lambda: ui.download(address)).props(
@@ -66,6 +72,7 @@ class Card:
             ui.button(icon="close", on_click=lambda: tab.put_away(policy.id)).props(
                 f'flat dense round size=xs aria-label="put policy {policy.id} away"'
             )
+        self.name = ui.label().classes("given-name")
         self.standing = ui.label().classes("standing")
         player = Player()
         digits = texts.decimals(view)
@@ -83,6 +90,7 @@ class Card:
             ui.label(texts.raw_returns(view, policy)).classes("consequences")
         self.beside = ui.label().classes("consequences beside")
         self.remark = ui.label().classes("consequences")
+        self.note = ui.label().classes("consequences note")
         with ui.element("div").classes("choice"):
             self.choose = ui.button(on_click=lambda: tab.choose(policy.id)).props("no-caps dense").classes("choose")
 
@@ -90,7 +98,16 @@ class Card:
         """Show what depends on the question and on the focus."""
         view, selection = self.tab.view, self.tab.selection
         focused = selection.focus == self.policy.id
-        self.standing.set_text(texts.standing(view, self.policy))
+        noted = view.noted.policy(self.policy.id)
+        self.star.set_icon("star" if noted.favourite else "star_border")
+        self.star.props(f"aria-pressed={str(noted.favourite).lower()}")
+        self.edit.set_icon("edit_note" if noted.text else "edit")
+        for label, text in ((self.name, noted.name), (self.note, noted.text)):
+            label.set_text(text)
+            label.set_visibility(bool(text))
+        standing = texts.standing(view, self.policy)
+        self.standing.set_text(standing)
+        self.standing.set_visibility(bool(standing) or not noted.name)  # without either its line stays free
         self.beside.set_text(texts.beside(view, selection, self.policy))
         self.remark.set_text(texts.remark(view, self.policy))
         self.choose.set_visibility(view.choosable(self.policy.id))

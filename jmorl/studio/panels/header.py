@@ -34,7 +34,7 @@ class Header:
         title = texts.title(view)
         if self.titled.is_new(title):
             ui.page_title(title)
-        self.run_name.set_text(f"{view.path.name} · {view.config.env}")
+        self.run_name.set_text(f"{view.noted.run.named(view.path.name)} · {view.config.env}")
         self.phase.set_text(texts.phase(view, now, session.leaving))
         self.facts.set_text(texts.facts(view, now))
         self.meter.style(f"width: {100 * texts.share_done(view, now):.1f}%")

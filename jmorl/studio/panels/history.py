@@ -45,11 +45,15 @@ class HistoryPanel:
         item = ui.element("div").classes("branch" + (" open" if is_open else "")).props('role="treeitem"')
         with item.style(f"margin-left: {18 * branch.depth}px"):
             with ui.element("div").classes("branch-head"):
-                ui.label(branch.name).classes("branch-name")
+                ui.label(branch.title).classes("branch-name")
+                edit = ui.button(icon="edit", on_click=lambda: self.tab.edit_run(branch))
+                edit.props("flat dense round size=xs").props["aria-label"] = f"name and note of {branch.name}"
                 ui.label(_state(branch, is_open)).classes("branch-state")
                 if not is_open:
                     open_it = ui.button("Open", on_click=lambda: self.tab.switch(branch.run))
                     open_it.props("no-caps dense outline size=sm")
+            if branch.noted.run.text or branch.noted.problem:
+                ui.label(branch.noted.run.text or branch.noted.problem).classes("note")
             for step in branch.steps:
                 self._add_step(branch, step)
             if is_open and view.question:
@@ -58,7 +62,8 @@ class HistoryPanel:
 
     def _add_step(self, branch: Branch, step: DecisionRecord) -> None:
         more = f", then {step.generations} rounds" if step.generations > 1 else ", and stop" if step.stop else ""
-        text = f"{_title(step.purpose, step.generation)}: policy {step.policy} ({self._values(step.values)})"
+        policy = branch.noted.policy(step.policy).named(f"policy {step.policy}")
+        text = f"{_title(step.purpose, step.generation)}: {policy} ({self._values(step.values)})"
         shown = [f"policy {each.policy}: {self._values(each.values)}" for each in step.shown[:LISTED]]
         if len(step.shown) > LISTED:
             shown.append(f"and {len(step.shown) - LISTED} more")

@@ -27,7 +27,7 @@ class Keys:
             ui.button("Close", on_click=self.list.close).props("flat no-caps")
         ui.button("Keys", on_click=self.list.open).props("flat dense no-caps size=sm")
 
-    def _press(self, event: KeyEventArguments) -> None:
+    async def _press(self, event: KeyEventArguments) -> None:
         modified = event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta
         if not event.action.keydown or modified or self.tab.covered:
             return
@@ -42,6 +42,8 @@ class Keys:
             self.list.open()
         elif key == "c" and focus is not None:
             self.tab.choose(focus)
+        elif key == "f" and focus is not None:
+            await self.tab.favour(focus)
         elif key == "=" and texts.offers_equal(self.tab.view):
             self.tab.say_equal()
         elif key == "x" and focus is not None:

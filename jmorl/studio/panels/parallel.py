@@ -28,4 +28,4 @@ class ParallelPanel:
             draw(self.marks, parallel_marks(view, selection))
 
     def _look_at(self, event: EChartPointClickEventArguments) -> None:
-        self.tab.look_at(int(clicked(event)[-1]))
+        self.tab.look_at(int(clicked(event)[len(self.tab.view.objectives)]))

@@ -1,40 +1,50 @@
 // A sortable table of policies that stays fast with thousands: only the rows in sight are in the document.
 //
-// Rows are [id, outside, cell, cell, ...]: `outside` says that the row lies outside the bounds. Values are returns,
-// sorted as such, the best first; a column's `scale` turns them into what people say.
+// Rows are [id, place, cell, cell, ...]: `place` is "outside" for one outside the bounds, and "replaced" for one that is
+// no longer in the front, which is shown only where it is asked for by its id. Values are returns, sorted as such, the
+// best first; a column's `scale` turns them into what people say.
 const HEIGHT = 26; // pixels of a row, as in studio.css
 const SPARE = 8; // rows above and below those in sight
+const NARROWEST = 76; // pixels of a column; one of words has two
+const EDGES = 58; // pixels of a row beside its columns, as in studio.css
 
 export default {
   template: `
     <div class="policies" role="grid" aria-label="Policies" :aria-rowcount="order.length + 1" tabindex="0"
          @scroll.passive="top = $event.target.scrollTop" @keydown="press">
-      <div class="policies-head" role="row">
-        <div v-for="(column, index) in columns" :key="index" role="columnheader"
+      <div class="policies-head" role="row" :style="{ minWidth }">
+        <div v-for="(column, index) in columns" :key="index" role="columnheader" :class="{ words: column.words }"
              :aria-sort="by === index ? (down ? 'descending' : 'ascending') : 'none'">
           <button type="button" :title="column.hint" @click="sort(index)">
             {{ column.label }}<span aria-hidden="true">{{ by === index ? (down ? " ▾" : " ▴") : "" }}</span>
           </button>
         </div>
       </div>
-      <div class="policies-body" :style="{ height: order.length * ${HEIGHT} + 'px' }">
+      <div class="policies-body" :style="{ height: order.length * ${HEIGHT} + 'px', minWidth }">
         <div v-for="place in places" :key="rows[order[place]][0]" role="row" :aria-rowindex="place + 2"
              :aria-selected="rows[order[place]][0] === focus" :class="classes(rows[order[place]])"
              :style="{ top: place * ${HEIGHT} + 'px' }" @click="$emit('look', rows[order[place]][0])">
           <span role="gridcell"><b v-if="marks[rows[order[place]][0]]" :class="'mark-' + marks[rows[order[place]][0]]">{{
-            marks[rows[order[place]][0]] }}</b></span>
-          <span v-for="(column, index) in columns" :key="index" role="gridcell">{{ text(rows[order[place]], index) }}</span>
+            marks[rows[order[place]][0]] }}</b><i v-if="favourites.includes(rows[order[place]][0])" role="img"
+            aria-label="favourite">★</i></span>
+          <span v-for="(column, index) in columns" :key="index" role="gridcell" :class="{ words: column.words }"
+                :title="column.words && text(rows[order[place]], index)">{{ text(rows[order[place]], index) }}</span>
         </div>
       </div>
     </div>`,
-  props: { rows: Array, columns: Array },
+  props: { rows: Array, columns: Array, favourites: Array },
   data: () => ({ by: 1, down: true, top: 0, height: 300, marks: {}, focus: null, kept: null }),
   computed: {
     order() {
       const kept = this.kept && new Set(this.kept);
-      const order = [...this.rows.keys()].filter((index) => !kept || kept.has(this.rows[index][0]));
+      const shown = ([id, place]) => (kept ? kept.has(id) : place !== "replaced");
+      const order = [...this.rows.keys()].filter((index) => shown(this.rows[index]));
       const key = (index) => this.value(this.rows[index], this.by);
-      return order.sort((a, b) => (this.down ? -1 : 1) * (key(a) - key(b)) || a - b);
+      const compare = (a, b) => (typeof a === "string" ? a.localeCompare(b) : a - b);
+      return order.sort((a, b) => (this.down ? -1 : 1) * compare(key(a), key(b)) || a - b);
+    },
+    minWidth() {
+      return this.columns.reduce((width, { words }) => width + (words ? 2 : 1) * NARROWEST, EDGES) + "px";
     },
     places() {
       const first = Math.max(0, Math.floor(this.top / HEIGHT) - SPARE);
@@ -58,7 +68,7 @@ export default {
       return `${write(this.value(row, index))} ±${write(Math.abs(row[std]) * Math.sign(scale))}`;
     },
     classes(row) {
-      return { "policies-row": true, outside: row[1], focus: row[0] === this.focus };
+      return ["policies-row", row[1], { focus: row[0] === this.focus }];
     },
     sort(index) {
       this.down = this.by === index ? !this.down : true;
