@@ -59,7 +59,7 @@ class StoredRun:
     decisions: tuple[Record, ...]
     result: Mapping[str, Any] | None  # None for a run that has not ended
     families: Families | None = None  # of the front that was blended last; None if none was
-    notes: Notes = Notes()
+    notes: Notes = Notes()  # that somebody has given to it and its policies
 
     @property
     def chosen(self) -> Policy | None:
@@ -80,6 +80,15 @@ class StoredRun:
         """The bounds in each generation [G + 1, M], -inf where there were none."""
         columns = [self.metrics[f"bound_{objective.name}"] for objective in self.objectives]
         return np.nan_to_num(np.stack(columns, axis=1), nan=-np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFront:
+    """The front of a run as its folder tells it, and what the run ended on."""
+
+    ids: tuple[int, ...]
+    values: np.ndarray  # [N, M]
+    result: tuple[int, np.ndarray] | None  # id and values [M], confirmed where the run did so; None before its end
 
 
 def read_run(path: Path | str) -> StoredRun:
@@ -112,6 +121,22 @@ def read_run(path: Path | str) -> StoredRun:
     with _reading(layout.result):
         _ = run.chosen  # its confirmed score can be read
     return run
+
+
+def read_front(path: Path, objectives: tuple[Objective, ...]) -> StoredFront:
+    """Read the present front of a run, and its result, without the rest. Raises StoredRunError, naming the file."""
+    layout = Layout(path)
+    names = [f"value_{objective.name}" for objective in objectives]
+    with _reading(layout.front):
+        rows = read_rows(layout.front)
+        ids = tuple(_whole_number(row["policy"]) for row in rows)
+        values = np.array([[float(row[name]) for name in names] for row in rows]).reshape(-1, len(names))
+    result = None
+    with _reading(layout.result):
+        if layout.result.exists():
+            row = _result(layout.result)["chosen"]
+            result = row["policy"], np.array([row[name] for name in names], float)
+    return StoredFront(ids, values, result)
 
 
 @contextmanager

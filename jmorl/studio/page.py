@@ -10,6 +10,7 @@ from jmorl.studio import texts
 from jmorl.studio.charts.chart_style import BLUE
 from jmorl.studio.panels.between import BetweenPanel
 from jmorl.studio.panels.cards import Cards
+from jmorl.studio.panels.comparison import ComparisonDialog
 from jmorl.studio.panels.ending import EndingDialog
 from jmorl.studio.panels.front import FrontPanel
 from jmorl.studio.panels.header import Header
@@ -57,7 +58,7 @@ class Page:
                 Keys(tab)
             with ui.element("div").classes("top"):
                 self.panels += [Introduction(tab), QuestionBar(tab), EndingDialog(tab)]
-                self.panels += [NoteDialog(tab)]
+                self.panels += [NoteDialog(tab), ComparisonDialog(tab)]
             with ui.element("div").classes("charts"):
                 self.panels += [FrontPanel(tab), ParallelPanel(tab)]
             with ui.element("div").classes("side"):

@@ -35,6 +35,7 @@ from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
 from jmorl.studio.between import BlendScore, score
+from jmorl.studio.comparison import Comparison, read_fronts
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.history import Branch, free_folder, read_tree
 from jmorl.studio.person import LeftOff, Person
@@ -115,6 +116,10 @@ class Session:
     def history(self) -> tuple[Branch, ...]:
         """Read the run that is open, and its branches."""
         return read_tree(self.view.path)
+
+    def fronts(self) -> Comparison:
+        """Read the fronts of the run that is open and of its branches."""
+        return read_fronts(self.history(), self.view.objectives)
 
     def note(self, run: str, policy: int | None, **changes: Any) -> bool:
         """Change what is noted about a policy of a run in the history, or about the run; see `change_note`.

@@ -19,6 +19,7 @@ from jmorl.storage.checkpoints import CheckpointError
 from jmorl.storage.notes_file import Note
 from jmorl.studio import texts
 from jmorl.studio.between import BlendScore
+from jmorl.studio.comparison import Comparison
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.history import Branch
 from jmorl.studio.selection import Selection, last_choice, listed, to_begin_with
@@ -67,6 +68,8 @@ class Tab:
         self.selection = Selection()
         self.ending: Ending | None = None  # that somebody is asked to confirm
         self.editing: Editing | None = None
+        self.comparison: Comparison | None = None  # of branches, that is looked at
+        self.left_out: frozenset[str] = frozenset()  # ids of the runs that the comparison does not show
         self.axes = (0, 1)  # objectives of the chart of points: to the right, and upwards
         self.side = texts.POLICIES  # title of the panel that is open at the side
         self.covered = False  # by a dialog, which takes all keys
@@ -287,6 +290,32 @@ class Tab:
     def stop_editing(self) -> None:
         """Keep nothing of what is being written."""
         self._edit(None)
+
+    async def compare(self) -> None:
+        """Show the fronts of all branches in one chart."""
+        found = await self._in_background(self.session.fronts)
+        if found and len(found.fronts) > 1:
+            self.comparison, self.left_out = found, frozenset()
+        elif found:
+            self.tell(" ".join([texts.NOTHING_TO_COMPARE, *found.problems]), "hint")
+        self.show()
+
+    async def compare_anew(self) -> None:
+        """Take the fronts as they are by now, if they are still looked at."""
+        found = await self._in_background(self.session.fronts)
+        if found and self.comparison:
+            self.comparison = found
+            self.show()
+
+    def compare_with(self, run_id: str, shown: bool) -> None:
+        """Show the front of a branch in the comparison, or leave it out."""
+        self.left_out = self.left_out - {run_id} if shown else self.left_out | {run_id}
+        self.show()
+
+    def stop_comparing(self) -> None:
+        """Look at the comparison no longer."""
+        self.comparison = None
+        self.show()
 
     def turn_axes(self, axes: tuple[int, int]) -> None:
         """Show other objectives in the chart of points."""

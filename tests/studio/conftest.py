@@ -9,6 +9,7 @@ import envs
 from jmorl.storage.resume import Continued
 from jmorl.storage.run_folder import RunFolder
 from jmorl.studio.session import Session
+from tests.studio.browsing import chromium
 
 PATIENCE = 120  # seconds until a test fails that waits in vain
 
@@ -35,6 +36,12 @@ class Watched(Session):
     def thought(self):
         """Wait until all prospects are known."""
         self.background.submit(lambda: None).result(PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as browser:
+        yield browser
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import pytest
 from jmorl.storage.policy_file import load_policy
 from jmorl.storage.stored_run import read_run
 from tests.registered import ThreeWays
-from tests.studio.browsing import Tab, chromium
+from tests.studio.browsing import Tab
 from tests.studio.serving import Served, free_port
 
 pytestmark = pytest.mark.studio
@@ -19,12 +19,6 @@ LEFT_OR_ENDED = """(left) => document.querySelector('[aria-label="iterations lef
   || document.querySelector(".ending")"""
 REPLACED = "has replaced your last choice"
 CHART = """getElement(document.querySelector(".front .nicegui-echart").id.slice(1)).chart"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

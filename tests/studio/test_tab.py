@@ -519,3 +519,33 @@ def test_damaged_notes_are_told_of_and_the_page_goes_on(session, question, watch
         assert [policy.id for policy in watching.tab.view.favourites] == [question.front[0].id]
     finally:
         later.close()
+
+
+def test_branches_are_named_and_compared(session, question, watching):
+    tab, run = watching.tab, watching.tab.view.run
+    asyncio.run(tab.compare())
+    assert watching.tab.comparison is None and watching.said == [("hint", texts.NOTHING_TO_COMPARE)]
+    watching.said.clear()
+    tab.choose(order(question.front, 0)[-1])
+    session.question()
+    asyncio.run(tab.step_back(run, 1))
+    session.question()
+    other = Watching(session).tab
+    seen = other.view
+    tab.edit_run(session.history()[0])
+    asyncio.run(tab.save_note("the first way", ""))
+    other.follow()
+    assert other.view is not seen and not other.view.noted.run.name  # it is about another run, in the same history
+    assert [branch.title for branch in session.history()] == ['run "the first way"', "run-2"]
+    asyncio.run(tab.compare())
+    assert [each.branch.name for each in tab.comparison.fronts] == ["run", "run-2"]
+    tab.compare_with(run, False)
+    assert tab.left_out == {run}
+    tab.compare_with(run, True)
+    assert not tab.left_out
+    before = tab.comparison
+    asyncio.run(tab.compare_anew())
+    assert tab.comparison is not before
+    tab.stop_comparing()
+    asyncio.run(tab.compare_anew())  # it was on its way
+    assert tab.comparison is None

@@ -46,7 +46,7 @@ def front_options(view: View, axes: tuple[int, int], asked: PointQuestion | None
     """Draw what stays while policies are looked at; `axes` are the objectives to the right and upwards."""
     limits = _limits(view, asked)
     return {
-        **_frame(view, axes, limits, visible=True),
+        **frame(view, axes, limits, visible=True),
         "series": [
             _area("bounds", view.bounds, axes, limits, IN_FORCE),
             _ghosts(view, axes),
@@ -65,7 +65,7 @@ def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: 
     prospect = selection.prospect if view.question else None  # what is answered brings nothing any more
     bounds = prospect.bounds if prospect else np.full(len(view.objectives), -np.inf)
     return {
-        **_frame(view, axes, limits, visible=False),
+        **frame(view, axes, limits, visible=False),
         "series": [
             _ruled_out(selection, axes, limits),
             _area("bounds that would follow", bounds, axes, limits, PROPOSED),
@@ -77,7 +77,7 @@ def front_marks(view: View, selection: Selection, axes: tuple[int, int], asked: 
     }
 
 
-def _frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
+def frame(view: View, axes: tuple[int, int], limits: np.ndarray, visible: bool) -> dict[str, Any]:
     """Return the options that give both charts the same coordinates: no label may move or shrink their grids."""
     visible = visible and bool(view.front)
     digits = max(len(f"{value:,.4g}") for value in view.objectives[axes[1]].read.of(limits[:, axes[1]]))

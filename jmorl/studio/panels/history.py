@@ -23,7 +23,10 @@ class HistoryPanel:
         self.tab = tab
         self.seen = Shown()
         self.content: tuple[tuple[Branch, ...], str, str] | None = None  # shown: branches, open run, open question
-        self.tree = ui.element("div").classes("history").props('role="tree" aria-label="History"')
+        with ui.element("div").classes("history"):
+            self.compare = ui.button(texts.COMPARE, on_click=tab.compare).props("no-caps dense outline size=sm")
+            self.compare.classes("compare")
+            self.tree = ui.element("div").props('role="tree" aria-label="History"')
 
     def show(self) -> None:
         """Read the history after a new view; replace the tree only if it has changed: somebody may press a button."""
@@ -34,6 +37,7 @@ class HistoryPanel:
         if content == self.content:
             return
         self.content = content
+        self.compare.set_visibility(len(content[0]) > 1)
         self.tree.clear()
         with self.tree:
             for branch in content[0]:
