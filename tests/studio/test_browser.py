@@ -50,7 +50,7 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
         # Two policies beside each other, at work; what choosing the one in focus would mean.
         policies = [tab.look_at(0), tab.look_at(1)]
         assert all(tab.pictures_differ(policy) for policy in policies)
-        tab.page.get_by_text(re.compile("If you choose .: the search narrows")).wait_for()
+        tab.page.get_by_text(re.compile("If you choose .: the search")).wait_for()
         tab.card(policies[1]).locator(".totals dd").first.wait_for()
         tab.screenshot("2-question")
 
@@ -389,7 +389,7 @@ def test_nothing_keeps_anybody_out_in_any_state(browser, tmp_path):
         tab.page.get_by_text("Warm-up: training 6 new agents").wait_for()
         found["warm-up"] = tab.barriers()
         tab.asked(1)
-        tab.page.get_by_text(re.compile("the search narrows")).wait_for()
+        tab.page.get_by_text(re.compile("If you choose A: the search")).wait_for()
         found["question"] = tab.barriers()
         for title in ("Progress", "History", "Limits", "Between", "E-NAUTILUS"):
             tab.tab(title)

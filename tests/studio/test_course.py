@@ -29,7 +29,7 @@ def test_a_policy_to_sign_for_takes_five_answers_at_most(browser_tab):
 
     # Three policies beside each other, and what choosing one would mean.
     page.get_by_text("Waiting for your answer: question 1 of at most").wait_for()
-    page.get_by_text("If you choose A: the search narrows to the dashed area").wait_for()
+    page.get_by_text("If you choose A: the search").wait_for()
     for letter in "BC":
         assert page.get_by_role("button", name=f"Choose {letter}").is_visible()
     assert page.get_by_text("Beside A: time").count() == 2
