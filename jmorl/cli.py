@@ -14,10 +14,8 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from envs.core import Objective
 from jmorl.arguments import SETTING, parse
 from jmorl.config import Config, ConfigError, resolve
-from jmorl.decision.protocol import DecisionMaker
 from jmorl.display.characters import substitute_in
 from jmorl.display.commands import command
 from jmorl.module_path import working_directory_last
@@ -120,14 +118,13 @@ def _branch(options: argparse.Namespace) -> None:
 
 def _begun(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> "Continued":
     """Begin a new run, over defaults of a command's own. Bad input makes nothing."""
-    import envs
-    from jmorl.storage.resume import Continued
-    from jmorl.storage.run_folder import RunFolder
+    from jmorl.storage.begin import begin
 
-    config = _checked_config(options, defaults)
-    environment = envs.make(config.env)
-    user = _decision_maker(config.user, environment.objectives)
-    return Continued(RunFolder.create(options.out, config, environment, options.force), None, user=user)
+    def problems(config: Config | None) -> list[str]:
+        return _problems_of_json(options, config.user) if config else []
+
+    overrides = {**(defaults or {}), **_overrides(options)}
+    return begin(options.preset, options.config, overrides, options.out, options.force, problems_of=problems)
 
 
 def _follow(continued: "Continued", options: argparse.Namespace) -> None:
@@ -234,34 +231,17 @@ def _open(session: "Session", options: argparse.Namespace) -> None:
         session.drive(_begun(options, {"user": PERSON}))
 
 
-def _checked_config(options: argparse.Namespace, defaults: Mapping[str, Any] | None = None) -> Config:
-    """Return the config of the options, over defaults of a command's own.
-
-    Every problem, that of the output folder included, is in one ConfigError.
-    """
-    from jmorl.storage.lock import FolderInUse
-    from jmorl.storage.run_folder import check_free
-
-    problems = []
-    try:
-        if options.out:
-            check_free(options.out, options.force)
-    except FolderInUse as error:
-        problems.append(f"out: {error}")
-    try:
-        config = resolve(options.preset, options.config, {**(defaults or {}), **_overrides(options)})
-        _check_json(options, config.user)
-    except ConfigError as error:
-        raise ConfigError(error.problems + problems) from None
-    if problems:
-        raise ConfigError(problems)
-    return config
-
-
 def _check_json(options: argparse.Namespace, user: str) -> None:
     """Raise ConfigError if a person at this terminal would be asked among lines of JSON."""
+    problems = _problems_of_json(options, user)
+    if problems:
+        raise ConfigError(problems)
+
+
+def _problems_of_json(options: argparse.Namespace, user: str) -> list[str]:
     if getattr(options, "json", False) and user.strip() == "terminal":
-        raise ConfigError(["json: questions at this terminal would stand between its lines; take another --user"])
+        return ["json: questions at this terminal would stand between its lines; take another --user"]
+    return []
 
 
 def _stored_user(run: Path) -> str:
@@ -270,15 +250,6 @@ def _stored_user(run: Path) -> str:
         return resolve(file=Layout(run).config).user
     except ConfigError:
         return ""
-
-
-def _decision_maker(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
-    from jmorl.decision.users import make_user
-
-    try:
-        return make_user(spec, objectives)
-    except ValueError as error:
-        raise ConfigError([f"user: {error}"]) from error
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, Any]:
@@ -370,11 +341,12 @@ def _enautilus(options: argparse.Namespace) -> None:
     from jmorl.display.console import PlainConsole
     from jmorl.display.fronts import front_table
     from jmorl.storage.afterwards import choose_afterwards
+    from jmorl.storage.resume import decision_maker
     from jmorl.storage.stored_run import read_run
 
     stored = read_run(options.run)
     _check_json(options, options.user or stored.config.user)
-    user = _decision_maker(options.user or stored.config.user, stored.objectives)
+    user = decision_maker(options.user or stored.config.user, stored.objectives)
     chosen = choose_afterwards(stored, user, options.iterations, options.points)
     if options.json:
         print(Layout(options.run).enautilus.read_text(encoding="utf-8"), end="")

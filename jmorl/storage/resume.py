@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import envs
-from envs.core import Environment
+from envs.core import Environment, Objective
 from jmorl.config import Config, ConfigError
 from jmorl.decision.protocol import DecisionMaker
 from jmorl.decision.records import DecisionRecord, ScriptError, read_log
@@ -169,7 +169,7 @@ def branch(
     config = config.replace(**{"user": user or config.user, "steps": steps or config.steps})
     environment = _environment(config)
     _refuse_to_rescale(path, manifest, environment)
-    decision_maker = _new_user(config, environment)
+    deciding = decision_maker(config.user, environment.objectives)
     checkpoint, state = state_after(path, generation, manifest, config, environment)
     used = state.iterations * config.steps_per_iteration
     if steps is not None and config.iteration_budget <= state.iterations:
@@ -190,7 +190,7 @@ def branch(
         folder.write_front(state.archive.members)
         folder.checkpoints.save(state, folder.logs())
         folder.checkpoints.wait()
-        return Continued(folder, state, tuple(notes), decision_maker, ask_now=True)
+        return Continued(folder, state, tuple(notes), deciding, ask_now=True)
     except BaseException:
         folder.close()
         raise
@@ -252,10 +252,10 @@ def _is_answered(log: Path) -> bool:
     return isinstance(last, DecisionRecord) and (last.purpose == "final" or last.stop)
 
 
-def _new_user(config: Config, environment: Environment[Any]) -> DecisionMaker:
-    """Who decides in a run that begins. Raises ConfigError."""
+def decision_maker(spec: str, objectives: tuple[Objective, ...]) -> DecisionMaker:
+    """Return the decision maker that a config's `user` names. Raises ConfigError if there is none, or no script."""
     try:
-        return make_user(config.user, environment.objectives)
+        return make_user(spec, objectives)
     except ValueError as error:
         raise ConfigError([f"user: {error}"]) from error
 

@@ -81,10 +81,11 @@ class RunFolder:
         environment: Environment[Any],
         force: bool = False,
         parent: Manifest | None = None,
+        runs: Path = RUNS,
     ) -> "RunFolder":
         """Make the folder, with config and manifest. Of several processes that do so at once, one succeeds.
 
-        Without a path it is a new one in `runs`, named after the time.
+        Without a path it is a new one in the folder `runs`, named after the time.
         `parent` is as in `new_manifest`. Raises FolderInUse as `check_free` does, or if the folder cannot be made, and
         NotAsDeclared for an environment that is not what it says, or not what `config` names; nothing is changed then.
         """
@@ -94,11 +95,11 @@ class RunFolder:
         check_run(environment, config.learning, envs.make_anew(config.env))
         check_same(environment, envs.make(config.env), config.env)
         try:
-            path = _made(path)
+            path = _made(path, runs)
             layout = Layout(path)
             lock = RunLock(path)
         except OSError as error:
-            raise FolderInUse(f"{path or RUNS} cannot be written: {error.strerror}") from error
+            raise FolderInUse(f"{path or runs} cannot be written: {error.strerror}") from error
         try:
             _check_contents(layout, force)  # another process may have had the lock since it was looked at
             _empty(layout)
@@ -232,17 +233,17 @@ class RunFolder:
         }
 
 
-def _made(path: Path | None) -> Path:
-    """Make the folder, or without a path the next that is free: runs that begin in the same second get one each."""
+def _made(path: Path | None, runs: Path) -> Path:
+    """Make the folder, or without a path the next one that is free in `runs`: each run of a second gets its own."""
     if path:
         path.mkdir(parents=True, exist_ok=True)
         return path
     started = time.strftime("%Y%m%d-%H%M%S")
     for name in itertools.chain([started], (f"{started}-{number}" for number in itertools.count(2))):
         with suppress(FileExistsError):
-            (RUNS / name).mkdir(parents=True)
+            (runs / name).mkdir(parents=True)
             break
-    return RUNS / name
+    return runs / name
 
 
 def check_free(path: Path, force: bool) -> None:
