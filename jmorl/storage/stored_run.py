@@ -104,7 +104,7 @@ def read_run(path: Path | str) -> StoredRun:
         check_config(path, manifest, config)
         objectives = measured_in(config.evaluation.units, envs.make(config.env).objectives)
         decisions = tuple(read_log(layout.decisions)) if layout.decisions.exists() else ()
-        result = _result(layout.result) if layout.result.exists() else None
+        result = read_result(layout.result) if layout.result.exists() else None
         families = read_families(layout.families) if layout.families.exists() else None
     with _reading(layout.metrics):
         metrics = _metrics(read_rows(layout.metrics))
@@ -157,7 +157,8 @@ def _reading(path: Path, kind: str = "") -> Iterator[None]:
         raise StoredRunError(str(error) if named else f"{path} cannot be read{kind}: {error}") from error
 
 
-def _result(path: Path) -> Mapping[str, Any]:
+def read_result(path: Path) -> Mapping[str, Any]:
+    """Read the result of a run. Raises OSError, and DocumentError for one that is damaged."""
     result = json_object(path.read_bytes(), str(path))
     check_fields(result, _RESULT, str(path))
     return result
