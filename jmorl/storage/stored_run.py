@@ -134,7 +134,7 @@ def read_front(path: Path, objectives: tuple[Objective, ...]) -> StoredFront:
     result = None
     with _reading(layout.result):
         if layout.result.exists():
-            row = _result(layout.result)["chosen"]
+            row = read_result(layout.result)["chosen"]
             result = row["policy"], np.array([row[name] for name in names], float)
     return StoredFront(ids, values, result)
 

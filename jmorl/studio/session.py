@@ -1,8 +1,8 @@
 """A run beside a page: driven in a thread of its own, shown as immutable records, steered by commands.
 
-The run never waits for anybody but the person who is asked. Whoever shows it reads `view`, `prospects` and `dialogue`,
-each replaced as a whole, and compares them by identity with what was shown last. Some commands wait for the generation
-that is going on, and say so.
+One run is open at a time, or none yet. It never waits for anybody but the person who is asked. Whoever shows it reads
+`view`, `prospects` and `dialogue`, each replaced as a whole, and compares them by identity with what was shown last.
+Some commands wait for the generation that is going on, and say so.
 """
 
 import threading
@@ -32,6 +32,7 @@ from jmorl.storage.layout import Layout
 from jmorl.storage.notes_file import change_note, read_notes
 from jmorl.storage.policy_file import PolicyFileError, StoredPolicy, load_policy, save_policy
 from jmorl.storage.resume import AlreadyFinished, Continued, branch, resume
+from jmorl.storage.run_folder import RUNS
 from jmorl.storage.stored_run import read_run
 from jmorl.studio import dialogue as dialogues
 from jmorl.studio.between import BlendScore, score
@@ -45,43 +46,98 @@ LASTING = (TrainingFault, AnswerError, MethodError)  # what breaks a run off aga
 
 
 class Session:
-    """The run that is open, and what its choices would mean.
+    """The run that is open, if there is one, and what its choices would mean.
 
-    `background` works out what choosing a policy would mean, one policy after the other; it ends with the session.
+    `runs` is the folder of the runs that can be opened, and of new ones. `background` works out what choosing a policy
+    would mean, one policy after the other; it ends with the session.
     """
 
-    view: View
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic, background: Executor | None = None):
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, background: Executor | None = None, runs: Path = RUNS
+    ):
         self.clock = clock
+        self.runs = runs
+        self._view: View | None = None
         self.prospects: Mapping[int, Prospect] = {}  # policy -> what choosing it now would mean, as far as known
         self.dialogue: Dialogue | None = None
         self._worked_out: set[tuple[int, int]] = set()  # question and policy of prospects that are known, or to come
         self.leaving = False  # the run is about to be left, after its generation
+        self.opening = ""  # name of the run that is about to take its place
+        self._next: Path | None = None  # its folder, once it is ready
         self._moving = threading.Lock()  # while one run is left for another
         self._changing = threading.Lock()  # while the view makes way for the next one
         self._noting = threading.Lock()  # while a file of notes is read and written
+        self._starting, self._closed = threading.Lock(), False
         self._person: Person | None = None
         self._thread: threading.Thread | None = None
         self._background = background or ThreadPoolExecutor(1, "prospects")
 
+    @property
+    def is_open(self) -> bool:
+        """Whether a run is open; once one is, one always is."""
+        return self._view is not None
+
+    @property
+    def view(self) -> View:
+        """The open run as it is shown. Raises ValueError if none is open."""
+        if self._view is None:
+            raise ValueError("no run is open")
+        return self._view
+
+    @view.setter
+    def view(self, view: View) -> None:
+        self._view = view
+
+    @property
+    def open_folder(self) -> Path | None:
+        """Return the folder of the run that is open, resolved; None if none is open."""
+        return self._view.path.resolve() if self._view else None
+
+    @property
+    def held_folders(self) -> tuple[Path, ...]:
+        """Return the folders of the run that is open and of the one that is ready to be, resolved."""
+        return tuple(path.resolve() for path in (self.open_folder, self._next) if path)
+
     def open(self, path: Path) -> None:
-        """Show the run in a folder, and go on with it if it has not ended. Raises as `resume` and `read_run` do."""
-        try:
-            self.drive(resume(path))
-        except AlreadyFinished:
-            self._show(path)
+        """Show the run in a folder, and go on with it if it has not ended.
+
+        The run that is open is left after the generation that is going on, once this one is known to open: until then
+        nothing changes. Raises as `resume` and `read_run` do, and ValueError while another run is being opened.
+        """
+        if path.resolve() == self.open_folder and self.view.timeline:
+            return
+        with self._move(path.name):
+            try:
+                self.drive(resume(path))
+            except AlreadyFinished:
+                view = stored_view(path)
+                self.leave()
+                self._show(view)
+
+    def begin(self, name: str, begun: Callable[[], Continued]) -> None:
+        """Drive the new run that `begun` makes, called `name`, in place of the one that is open.
+
+        Raises what `begun` does, and then nothing has changed, and ValueError while another run is being opened.
+        """
+        with self._move(name):
+            self.drive(begun())
 
     def drive(self, continued: Continued) -> None:
-        """Go on with a run, in a thread. No other may be going on."""
+        """Go on with a run, in a thread. The one that is open is left after the generation that is going on."""
         folder = continued.folder
-        self._show(folder.path)
-        timeline = Timeline(folder.config, self.clock())
-        self._change(timeline=timeline, notes=continued.notes, result=None, reason="")
-        self.leaving = False
-        self._person = Person(self.ask) if folder.config.user == PERSON else None
-        self._thread = threading.Thread(target=self._run, args=(continued, self._person), name="run")
-        self._thread.start()
+        try:
+            view = stored_view(folder.path)
+            self._next = folder.path
+            self.leave()
+            with self._starting:
+                if self._closed:
+                    raise ValueError("the studio is being closed")
+                self._start(continued, view)
+        except BaseException:
+            folder.close()
+            raise
+        finally:
+            self._next = None
 
     def ask(self, question: Question) -> None:
         """Open a question of the run. Scores that were confirmed for it are those of the front from now on."""
@@ -114,8 +170,8 @@ class Session:
             self._background.submit(self._note_prospect, question, state, policy)
 
     def history(self) -> tuple[Branch, ...]:
-        """Read the run that is open, and its branches."""
-        return read_tree(self.view.path)
+        """Read the run that is open, and its branches; nothing if none is open."""
+        return read_tree(self.view.path) if self.is_open else ()
 
     def fronts(self) -> Comparison:
         """Read the fronts of the run that is open and of its branches."""
@@ -140,12 +196,13 @@ class Session:
         Waits for the generation that is going on. Raises as `branch` does.
         """
         path = self._in_history(run).path
-        with self._move():
+        new = free_folder(path)
+        with self._move(new.name):
             self.leave()
             try:
-                self.drive(branch(path, generation - 1, free_folder(path), PERSON))
+                self.drive(branch(path, generation - 1, new, PERSON))
             except Exception:
-                self._show(self.view.path)
+                self._show(stored_view(self.view.path))
                 raise
 
     def train_on(self, rounds: int) -> None:
@@ -156,18 +213,16 @@ class Session:
         view = self.view
         if view.result is None or not view.generations:
             raise ValueError("this run has not ended; it can go on as it is")
-        with self._move():
+        new = free_folder(view.path)
+        with self._move(new.name):
             last, config = view.generations[-1], view.config
             iterations = round(last.steps / config.steps_per_iteration) + rounds * config.population.iterations
             steps = iterations * config.steps_per_iteration
-            self.drive(branch(view.path, last.number, free_folder(view.path), PERSON, steps=steps))
+            self.drive(branch(view.path, last.number, new, PERSON, steps=steps))
 
     def switch(self, run: str) -> None:
         """Open another run of the history. Waits for the generation that is going on; raises as `open` does."""
-        path = self._in_history(run).path
-        with self._move():
-            self.leave()
-            self.open(path)
+        self.open(self._in_history(run).path)
 
     def begin_dialogue(self, iterations: int, points: int) -> None:
         """Begin E-NAUTILUS on the front. Raises ValueError if there is none, or for numbers below 1."""
@@ -253,18 +308,31 @@ class Session:
 
     def close(self) -> None:
         """Leave the run, and do nothing any more."""
+        with self._starting:
+            self._closed = True
         self.leave()
         self._background.shutdown(cancel_futures=True)
 
     @contextmanager
-    def _move(self) -> Iterator[None]:
+    def _move(self, to: str) -> Iterator[None]:
         """Allow one move from run to run at a time. Raises ValueError for a second one."""
         if not self._moving.acquire(blocking=False):
-            raise ValueError("another tab is just leaving this run; nothing has changed")
+            raise ValueError(f"{self.opening} is just being opened; nothing has changed")
+        self.opening = to
         try:
             yield
         finally:
+            self.opening = ""
             self._moving.release()
+
+    def _start(self, continued: Continued, view: View) -> None:
+        """Show the view, and go on with its run in a thread."""
+        config = continued.folder.config
+        timeline = Timeline(config, self.clock())
+        self._show(replace(view, timeline=timeline, notes=continued.notes, result=None, reason=""))
+        self._person = Person(self.ask) if config.user == PERSON else None
+        self._thread = threading.Thread(target=self._run, args=(continued, self._person), name="run")
+        self._thread.start()
 
     def _run(self, continued: Continued, person: Person | None) -> None:
         """Run to the end, or until the run is left, and keep the view up to date; the thread of the run does this."""
@@ -286,13 +354,11 @@ class Session:
         finally:
             self._change(timeline=None, question=None)
 
-    def _show(self, path: Path) -> None:
-        """Show what the folder has."""
+    def _show(self, view: View) -> None:
+        """Show a run, of which nothing is worked out."""
         self.prospects, self._worked_out, self.dialogue = {}, set(), None
-        with self._noting:
-            view = stored_view(path)
-            with self._changing:
-                self.view = view
+        with self._noting, self._changing:
+            self.view = replace(view, noted=read_notes(view.path))  # which may have changed since
 
     def _change(self, **changes: Any) -> None:
         """Replace the view by one with these changes, and lose none that another thread makes."""

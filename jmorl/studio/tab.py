@@ -51,8 +51,9 @@ class Editing:
 class Tab:
     """The session's records that a tab shows, and what somebody who sits at it can do.
 
-    `show` is called when the tab holds something new; `tell` puts a message on the page. `kept` outlives a reload of
-    the page: what is laid out is kept there.
+    A run is open. `show` is called when the tab holds something new; `tell` puts a message on the page. `kept` outlives
+    a reload of the page: what is laid out is kept there. `renew` reloads the page, whose panels are made for the
+    objectives of a run, when one with others was opened.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class Tab:
         show: Callable[[], None],
         tell: Callable[[str, Tone], None],
         kept: MutableMapping[str, Any] | None = None,
+        renew: Callable[[], None] = lambda: None,
     ):
         self.session = session
         self.view, self.dialogue = session.view, session.dialogue
@@ -77,7 +79,9 @@ class Tab:
         self._settled: Question | None = None  # a question that whoever sits here knows to be answered
         self._limited = False  # limits were set here since the last answer
         self._told = ""  # what was wrong with the notes
-        self.show, self.tell = show, tell
+        self._commands = 0  # of this tab, that are at work in the background
+        self._news: str = self.kept.pop("news", "")  # of what happened before a reload
+        self.show, self.tell, self.renew = show, tell, renew
         place, selection = self.kept.get("selection", (None, None))
         if place == self._place:
             self._lay_out(selection.known_in(self.view))
@@ -108,6 +112,15 @@ class Tab:
     def follow(self) -> None:
         """Take over what the session has now, and show it."""
         before, view, dialogue = self.view, self.session.view, self.session.dialogue
+        if view.path != before.path and not self._commands:
+            self._news = texts.opened_elsewhere(view)
+        if view.objectives != before.objectives:
+            self.kept["news"] = self._news
+            self.renew()
+            return
+        if self._news:
+            self.tell(self._news, "warning")
+            self._news = ""
         if view.path == before.path and len(view.choices) > len(before.choices):
             self._tell_of_answer(before.question, view)
         led_to = dialogue.chosen if dialogue and dialogue is not self.dialogue else None
@@ -387,11 +400,13 @@ class Tab:
     ) -> Result | None:
         """Run a command that takes a while, during which the page goes on. Tell why it failed, if it does."""
         result = None
+        self._commands += 1
         try:
             result = await run.io_bound(command, *arguments, **named)
         except (ValueError, OSError, CheckpointError, ComputationFailed) as error:
             self.tell(str(error), "failure")
         self.follow()
+        self._commands -= 1
         return result
 
     def _tell_of_wait(self, doing: str) -> None:

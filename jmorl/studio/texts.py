@@ -1,5 +1,6 @@
 """The texts of the page."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import accumulate
@@ -8,12 +9,13 @@ import numpy as np
 
 from jmorl.display.commands import command
 from jmorl.display.readings import Writer, values_in_words, writers_for
-from jmorl.display.text import duration, front_question, minus, plural, short_count
+from jmorl.display.text import duration, front_question, minus, number, plural, short_count
 from jmorl.report.timeline import Timeline
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
 from jmorl.storage.notes_file import LONGEST_NAME, LONGEST_TEXT
 from jmorl.studio.between import EPISODES, BlendScore
+from jmorl.studio.home import Facts, Origin, printable
 from jmorl.studio.selection import LETTERS, Selection, last_choice, reaching, wanted
 from jmorl.studio.view import PERSON, View
 
@@ -79,6 +81,35 @@ KEYS = (
     ("space", "stop and start the playback"),
     ("?", "these keys"),
 )
+
+# The home page:
+ALL_RUNS, GO_TO_RUN = "All runs", "Go to it"
+RUNS_COLUMNS = ("Run", "Environment", "Progress", "State", "Last written")
+READING, NO_RUNS = "Reading the folder …", "There is no run in this folder yet. Begin one with the form."
+FILTER, NO_MATCH = "Filter the runs", "No run has all these words."
+GONE = "{name} is no longer there."
+NEW_RUN, UNNAMED, BEGIN = "New run", "the new run", "Begin"
+STATES = {
+    "finished": "Finished",
+    "interrupted": "Interrupted",
+    "elsewhere": "Running elsewhere",
+    "damaged": "Damaged",
+}
+OPEN_HERE = "Open here"
+ENVIRONMENT, PRESET, STEPS, SEED = "Environment", "Preset", "Steps of training", "Seed"
+FOLDER = "Folder (empty: date and time)"
+MORE_SETTINGS, MORE_LABEL = "More settings", "Settings as TOML"
+MORE_HINT = "A line for each, such as ppo.learning_rate = 1e-3. They count more than the fields above."
+USUAL = "as usual: {value}"
+ASK_LABEL = "You are asked"
+ASK = {"always": "before every round", "unsure": "only when in doubt"}
+QUESTION_LABEL = "You are asked for"
+QUESTION = {
+    "front": "the best of the whole front",
+    "few": "the best of a few policies",
+    "pair": "the better one of a pair",
+    "rank": "an order of a few policies",
+}
 
 
 def phase(view: View, now: float, leaving: bool = False) -> str:
@@ -199,8 +230,17 @@ def remarks(view: View, policy: Policy) -> str:
 
 def introduction(view: View) -> str:
     """Say to somebody new what happens here."""
-    *others, last = (objective.label for objective in view.objectives)
-    return INTRODUCTION.format(objectives=f"{', '.join(others)} and {last}")
+    return INTRODUCTION.format(objectives=_joined([objective.label for objective in view.objectives]))
+
+
+def objectives(labels: Sequence[str]) -> str:
+    """Say what an environment has for objectives."""
+    return f"Its objectives are {_joined(labels)}."
+
+
+def _joined(labels: Sequence[str]) -> str:
+    *others, last = labels
+    return f"{', '.join(others)} and {last}"
 
 
 def ranges(view: View) -> list[str]:
@@ -361,6 +401,47 @@ def _certainty(view: View, policy: Policy) -> str:
     if policy.confirmation:
         return f"{outside}Scores from {plural(policy.confirmation.episodes, 'fresh episode')}."
     return f"{outside}Scores from the search: the best of many, they may be lucky."
+
+
+def opened_elsewhere(view: View) -> str:
+    """Say that another run was opened than the one that was shown."""
+    return f"{printable(view.path.name)} was opened, in another tab."
+
+
+def open_run(view: View | None, opening: str, now: float) -> str:
+    """Say which run is open and what is going on, or which one is about to be opened, and what that waits for."""
+    if opening:
+        waits = view is not None and view.timeline is not None and view.question is None
+        after = f", as soon as this round of {printable(view.path.name)} is over" if view and waits else ""
+        return f"Opening {opening}{after} …"
+    return f"Open: {printable(view.path.name)}. {phase(view, now)}." if view else ""
+
+
+def decider(facts: Facts) -> str:
+    """Say how a run searches, and who decides."""
+    return f"{facts.method}, {'you decide' if facts.user == PERSON else f'user {facts.user}'}"
+
+
+def progress(facts: Facts) -> str:
+    """Say how many rounds of a run are over."""
+    return "in the warm-up" if facts.rounds is None else plural(facts.rounds, "round")
+
+
+def budget(facts: Facts) -> str:
+    """Say how much of its budget a run has used."""
+    return f"{short_count(facts.steps)} of {short_count(facts.budget)} steps"
+
+
+def branch_of(origin: Origin | None) -> str:
+    """Say where a branch leaves another run; nothing of a run that is no branch."""
+    if origin is None:
+        return ""
+    return f"branch of {origin.name} after {f'round {origin.generation}' if origin.generation else 'its warm-up'}"
+
+
+def result(facts: Facts) -> str:
+    """Return the scores of a run's result; nothing before the end."""
+    return minus(", ".join(f"{objective} {number(value)}" for objective, value in facts.scores))
 
 
 def _generation(timeline: Timeline) -> int:

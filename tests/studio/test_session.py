@@ -11,8 +11,9 @@ from jmorl.decision.answers import Answer, Choose
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.search.policy import values_of
 from jmorl.storage.afterwards import choose_afterwards
+from jmorl.storage.lock import check_unlocked
 from jmorl.storage.notes_file import Note
-from jmorl.storage.resume import Continued, resume
+from jmorl.storage.resume import Continued, branch, resume
 from jmorl.storage.run_folder import RunFolder
 from jmorl.storage.stored_run import read_run
 from tests.resuming import follow, outcome, train
@@ -37,6 +38,103 @@ def answer_all_from(session, question, objective=0):
             session.ended()
             return answers
         question = session.question()
+
+
+@pytest.fixture
+def second(whole, tmp_path):
+    """Copy a run that has ended, and make a branch of it in which a person decides; nobody has it open."""
+    ended, waiting = shutil.copytree(whole, tmp_path / "more" / "ended"), tmp_path / "more" / "waiting"
+    branch(ended, 2, waiting, user="terminal").folder.close()
+    return waiting
+
+
+def test_a_session_may_have_no_run_open(make_session, second):
+    session = make_session()
+    assert not session.is_open and session.history() == () and session.policy_file("any", 1) is None
+    with pytest.raises(ValueError, match="no run is open"):
+        _ = session.view
+    with pytest.raises(ValueError, match="no run is open"):
+        session.train_on(1)
+    session.leave()
+    session.open(second)
+    assert session.is_open and session.question().generation == 3
+
+
+def test_another_run_takes_the_place_of_the_open_one_which_can_be_taken_up(session, second):
+    question, path = session.question(), session.view.path
+    session.open(second)
+    assert session.question().generation == 3 and session.open_folder == second
+    assert not session.answer(question, Answer(question.front[0].id))
+    check_unlocked(path)
+    session.open(second.parent / "ended")
+    assert session.view.result and session.view.question is None
+    session.open(path)
+    assert session.question().generation == question.generation
+
+
+def test_a_run_that_cannot_be_opened_leaves_the_open_one_as_it_is(session, second):
+    question = session.question()
+    (second / "config.toml").unlink()
+    with pytest.raises(ValueError, match=r"has lost its config.toml"):
+        session.open(second)
+    ended = second.parent / "ended"
+    (ended / "policies.csv").unlink()
+    with pytest.raises(ValueError, match=r"policies.csv"):
+        session.open(ended)
+    assert session.view.question is question and session.answer(question, Answer(question.front[0].id))
+
+
+def test_a_run_that_cannot_be_shown_is_not_held(make_session, second, monkeypatch):
+    def broken(path):
+        raise ValueError("cannot be shown")
+
+    monkeypatch.setattr("jmorl.studio.session.stored_view", broken)
+    with pytest.raises(ValueError, match="cannot be shown"):
+        make_session().open(second)
+    check_unlocked(second)
+
+
+def test_to_open_the_run_that_goes_on_changes_nothing(session):
+    question = session.question()
+    session.open(session.view.path)
+    assert session.view.question is question
+
+
+def test_what_is_being_opened_is_told_until_the_open_run_is_left(session, second, monkeypatch):
+    session.question()
+    leave, told, path = session.leave, [], session.view.path
+
+    def leaving():
+        told.append((session.opening, session.open_folder, session.held_folders))
+        leave()
+
+    monkeypatch.setattr(session, "leave", leaving)
+    session.open(second)
+    assert told == [("waiting", path, (path, second))]
+    assert session.opening == "" and session.held_folders == (second,)
+
+
+def test_a_new_run_takes_the_place_of_the_open_one_unless_it_cannot_begin(session, person_config, tmp_path):
+    question = session.question()
+
+    def wrong():
+        raise ValueError("is wrong")
+
+    with pytest.raises(ValueError, match="is wrong"):
+        session.begin("new", wrong)
+    assert session.view.question is question
+    environment = envs.make(person_config.env)
+    session.begin("new", lambda: Continued(RunFolder.create(tmp_path / "new", person_config, environment), None))
+    assert session.question().generation == 1 and session.view.path == tmp_path / "new"
+
+
+def test_nothing_is_opened_any_more_when_the_studio_is_closed(make_session, second):
+    session = make_session()
+    session.close()
+    with pytest.raises(ValueError, match="being closed"):
+        session.open(second)
+    assert not session.is_open
+    check_unlocked(second)
 
 
 def test_a_run_steered_on_the_page_replays_from_its_log_to_the_same_result(session, person_config, tmp_path):
@@ -159,7 +257,7 @@ def test_of_two_that_step_back_at_once_the_second_is_told(session, monkeypatch):
     leave = session.leave
 
     def meanwhile():
-        with pytest.raises(ValueError, match="another tab is just leaving"):
+        with pytest.raises(ValueError, match="run-2 is just being opened"):
             session.step_back(session.view.run, 1)
         told.append(True)
         leave()

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -15,14 +16,18 @@ from jmorl.studio import texts
 from jmorl.studio.selection import last_choice, listed
 from jmorl.studio.tab import Tab
 from jmorl.studio.view import stored_view
+from tests.resuming import train
 
 
 class Watching:
     """A tab, with what it has said and how often it was shown."""
 
     def __init__(self, session, kept=None):
-        self.said, self.shown = [], 0
-        self.tab = Tab(session, self._show, lambda text, tone: self.said.append((tone, text)), kept)
+        self.said, self.shown, self.renewed = [], 0, 0
+        self.tab = Tab(session, self._show, lambda text, tone: self.said.append((tone, text)), kept, self._renew)
+
+    def _renew(self):
+        self.renewed += 1
 
     def _show(self):
         self.shown += 1
@@ -549,3 +554,24 @@ def test_branches_are_named_and_compared(session, question, watching):
     tab.stop_comparing()
     asyncio.run(tab.compare_anew())  # it was on its way
     assert tab.comparison is None
+
+
+def test_a_run_opened_in_another_tab_is_told_of(session, question, watching, whole, tmp_path):
+    session.open(shutil.copytree(whole, tmp_path / "another"))
+    watching.tab.follow()
+    watching.tab.follow()
+    assert watching.said == [("warning", "another was opened, in another tab.")]
+    assert watching.tab.view.path.name == "another" and not watching.renewed
+
+
+def test_a_page_is_renewed_for_a_run_with_other_objectives(session, question, small_config, tmp_path):
+    kept = {}
+    watching = Watching(session, kept)
+    shown = watching.shown
+    session.open(train(tmp_path / "two", small_config.replace(env="mo-mountaincarcontinuous-v0", user="A")))
+    watching.tab.follow()
+    assert watching.renewed == 1 and watching.shown == shown and not watching.said
+    renewed = Watching(session, kept)
+    renewed.tab.follow()
+    renewed.tab.follow()
+    assert renewed.said == [("warning", "two was opened, in another tab.")] and not renewed.renewed
