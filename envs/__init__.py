@@ -36,6 +36,7 @@ __all__ = [
     "check_environment",
     "ids",
     "make",
+    "module_of",
     "plain_id",
     "register",
     "registry",
@@ -138,6 +139,12 @@ def ids() -> list[str]:
 def plain_id(id: str) -> str:
     """Return the id without module and options: what MO-Gymnasium calls the environment."""
     return id.partition(",")[0].rpartition(":")[2]
+
+
+def module_of(id: str) -> str:
+    """Return the module that `make(id)` imports first; nothing if the id names none, or one of the known libraries."""
+    module = OUTSIDE_BRACKETS.split(id)[0].rpartition(":")[0]
+    return "" if module in LIBRARIES else module
 
 
 def _import(id: str, module: str) -> None:

@@ -61,8 +61,8 @@ MAY_IMPORT = {
     "jmorl.studio": {
         *("envs", "jax", "jmorl.config", "jmorl.decision", "jmorl.display", "jmorl.evaluation", "jmorl.events"),
         *("jmorl.learning", "jmorl.playback"),
-        *("jmorl.methods", "jmorl.report", "jmorl.loop", "jmorl.search", "jmorl.state", "jmorl.storage"),
-        "jmorl.units",
+        *("jmorl.methods", "jmorl.presets", "jmorl.report", "jmorl.loop", "jmorl.search", "jmorl.state"),
+        *("jmorl.storage", "jmorl.units"),
     },
     "jmorl.experiments": {
         *("envs", "jax", "jmorl.config", "jmorl.confirmation", "jmorl.decision", "jmorl.display", "jmorl.events"),

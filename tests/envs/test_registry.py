@@ -110,6 +110,14 @@ def test_the_plain_id_is_without_module_and_options(id):
     assert envs.plain_id(id) == "a-v0"
 
 
+@pytest.mark.parametrize(
+    ("id", "module"),
+    [("a-v0", ""), ("a-v0,b=c:d", ""), ("brax:ant,backend=spring", ""), ("x.y:a-v0", "x.y"), ("x:a-v0,b=c", "x")],
+)
+def test_the_module_that_is_imported_is_known_beforehand(id, module):
+    assert envs.module_of(id) == module
+
+
 def test_an_id_is_taken_once():
     envs.register(MountainCar.id, MountainCar)  # the same again is fine
     with pytest.raises(ValueError, match="already registered"):
