@@ -18,6 +18,7 @@ FLAG, NEGATIVE_VALUE = re.compile(r"--[^=]+"), re.compile(r"-\.?\d.*")
 OF_SETTINGS = """\
 In parentheses is a setting's value; below it are values for environments in which the default preset, or another one
 that is named, has something else."""
+STUDIO_RUN = "run folder, to go on with or to look at; or a folder of runs, to pick one or to begin one there"
 PAPER_ITEMS = ("table1", "fig5", "fig6", "fig9", "fig10", "table2", "fig7", "fig8", "fig11", "targets")
 
 
@@ -161,12 +162,12 @@ def _add_study(commands: Any) -> None:
 def _add_studio(commands: Any) -> None:
     studio = commands.add_parser(
         "studio",
-        help="steer a run on a web page: a new one, or one that was interrupted or has ended",
+        help="steer a run on a web page: a new one, one that was interrupted or has ended, or one of a folder of runs",
         description="Without RUN a new one is made, as by train; you are its user unless --user names another.\n"
         f"{OF_SETTINGS}",
         formatter_class=argparse.RawTextHelpFormatter,
     )
-    studio.add_argument("run", type=to_path, nargs="?", metavar="RUN", help="run folder, to go on with or to look at")
+    studio.add_argument("run", type=to_path, nargs="?", metavar="RUN", help=STUDIO_RUN)
     studio.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine alone)")
     studio.add_argument("--port", type=_port, default=8080, help="default: 8080")
     studio.add_argument("--token", help="what the page asks for (default: none on this machine, else a random one)")

@@ -207,7 +207,7 @@ def _studio(options: argparse.Namespace) -> None:
 
     server.check_address(options.host, options.port)
     token = options.token or (None if is_loopback(options.host) else secrets.token_urlsafe())
-    session = Session()
+    session = Session(runs=_home_folder(options))
     with StopSignals() as stop:
         try:
             _open(session, options)
@@ -215,20 +215,34 @@ def _studio(options: argparse.Namespace) -> None:
             with stop.interruptible():
                 server.serve(session, options.host, options.port, token)
         except Interrupted as error:
-            error.add_note(f"what the run has is kept; open it again with: {command('studio', session.view.path)}")
+            if session.is_open:
+                error.add_note(f"what the run has is kept; open it again with: {command('studio', session.view.path)}")
             raise
         finally:
             session.close()
 
 
 def _open(session: "Session", options: argparse.Namespace) -> None:
-    """Go on with the run that is named, or begin a new one."""
+    """Go on with the run that is named, or begin a new one; of a folder of runs none is open until one is picked."""
     from jmorl.studio.view import PERSON
 
-    if options.run:
-        session.open(options.run)
-    else:
+    if options.run is None:
         session.drive(_begun(options, {"user": PERSON}))
+    elif options.run != session.runs:
+        session.open(options.run)
+
+
+def _home_folder(options: argparse.Namespace) -> Path:
+    """Return the folder of runs: the one that is named, or that in which the run is."""
+    from jmorl.storage.run_folder import RUNS
+    from jmorl.studio.home import is_run
+
+    folder: Path | None = options.run
+    if folder is None:
+        return options.out.resolve().parent if options.out else RUNS
+    if not folder.exists():
+        raise ConfigError([f"{folder} does not exist; name a run or a folder of runs, or leave it out for a new run"])
+    return folder if folder.is_dir() and not is_run(folder) else folder.resolve().parent
 
 
 def _check_json(options: argparse.Namespace, user: str) -> None:

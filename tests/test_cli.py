@@ -237,6 +237,25 @@ def test_bad_input_is_one_clear_message(arguments, message, tmp_path, monkeypatc
     assert not list(tmp_path.iterdir())
 
 
+def test_the_studio_opens_a_run_or_shows_the_folder_of_runs_that_is_named(folder, monkeypatch, capsys):
+    served = []
+    monkeypatch.setattr(
+        "jmorl.studio.server.serve", lambda session, *_: served.append((session.runs.resolve(), session.open_folder))
+    )
+    runs = folder.parent
+    (runs / "empty").mkdir()
+    monkeypatch.chdir(folder)
+    for named in (folder, ".", runs, "..", runs / "empty"):
+        assert main(["studio", str(named), "--port", str(free_port())]) == 0
+    assert served == [(runs, folder), (runs, folder), (runs, None), (runs, None), (runs / "empty", None)]
+    for name, message in (("nowhere", "does not exist; name a run or"), ("result.json", "is not a run folder")):
+        capsys.readouterr()
+        assert main(["studio", str(folder / name), "--port", str(free_port())]) == 2
+        (error,) = capsys.readouterr().err.splitlines()
+        assert f"{folder / name} {message}" in error
+    assert len(served) == 5 and not (folder / "nowhere").exists()
+
+
 BAD = """
 import envs
 import jax.numpy as jnp

@@ -1,13 +1,12 @@
 """The page: its panels, where they stand, and when they are shown."""
 
 from collections.abc import Callable, MutableMapping
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from nicegui import ui
 
 from jmorl.studio import texts
-from jmorl.studio.charts.chart_style import BLUE
+from jmorl.studio.look import KINDS, dress
 from jmorl.studio.panels.between import BetweenPanel
 from jmorl.studio.panels.cards import Cards
 from jmorl.studio.panels.comparison import ComparisonDialog
@@ -30,7 +29,6 @@ from jmorl.studio.session import Session
 from jmorl.studio.tab import Tab, Tone
 
 REFRESH_SECONDS = 0.1
-STYLE = Path(__file__).parent / "studio.css"
 SIDE: dict[str, Callable[[Tab], Panel]] = {
     texts.POLICIES: PolicyTable,
     texts.PROGRESS: ProgressPanel,
@@ -39,19 +37,15 @@ SIDE: dict[str, Callable[[Tab], Panel]] = {
     texts.NAVIGATION: NavigationPanel,
     texts.BETWEEN: BetweenPanel,
 }
-DARK_RED = "#B34700"  # enough contrast for text
-KINDS: dict[Tone, Literal["warning", "negative"] | None] = {"hint": None, "warning": "warning", "failure": "negative"}
 
 
 class Page:
     """The panels of one browser tab, and the messages over them."""
 
     def __init__(self, session: Session, kept: MutableMapping[str, Any] | None = None):
-        self.tab = tab = Tab(session, self._show, self._tell, kept)
-        ui.add_css(STYLE)
-        ui.colors(primary=BLUE, negative=DARK_RED)
-        ui.dark_mode(None)  # as the browser has it
-        self.panels: list[Panel] = [Lost(tab)]
+        self.tab = tab = Tab(session, self._show, self._tell, kept, self._renew)
+        dress()
+        self.panels: list[Panel] = [Lost(lambda: tab.view.path)]
         with ui.element("div").classes("studio") as self.root:
             with ui.element("header").classes("bar"):
                 self.panels.append(Header(tab))
@@ -65,7 +59,7 @@ class Page:
                 self._add_side()
                 self.panels.append(Cards(tab))
         self._show()
-        ui.timer(REFRESH_SECONDS, tab.follow)
+        self.timer = ui.timer(REFRESH_SECONDS, tab.follow)
 
     def _add_side(self) -> None:
         """Add the panels of which one is open. All stay mounted, so that none has to be filled anew when it opens."""
@@ -84,6 +78,11 @@ class Page:
         self.titles.set_value(self.tab.side)
         for panel in self.panels:
             panel.show()
+
+    def _renew(self) -> None:
+        self.timer.deactivate()
+        with self.root:
+            ui.navigate.reload()
 
     def _tell(self, text: str, tone: Tone) -> None:
         with self.root:  # the button that was pressed may be gone

@@ -1,4 +1,4 @@
-"""The server of the studio: the page, and the files that it asks for."""
+"""The server of the studio: its pages, and the files that they ask for."""
 
 import asyncio
 import logging
@@ -15,7 +15,7 @@ from urllib.parse import quote, urlencode
 
 import jax
 from fastapi import HTTPException
-from fastapi.responses import FileResponse, JSONResponse, Response
+from fastapi.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from nicegui import app, ui
 
 from envs.drawing import NoDrawing
@@ -29,6 +29,8 @@ from jmorl.storage.stored_run import read_run
 from jmorl.studio.between import blended
 from jmorl.studio.episodes import episode_json
 from jmorl.studio.guard import Guard
+from jmorl.studio.home import Home
+from jmorl.studio.home_page import HomePage
 from jmorl.studio.page import Page
 from jmorl.studio.panels.introduction import REMEMBERED
 from jmorl.studio.panels.lost import SWITCHED_OFF
@@ -60,19 +62,12 @@ def address(host: str, port: int, token: str | None) -> str:
 
 
 def serve(session: Session, host: str, port: int, token: str | None) -> None:
-    """Serve the page, in a thread of its own, until something is raised here: signals are for the caller to hear."""
+    """Serve the pages, in a thread of its own, until something is raised here: signals are for the caller to hear."""
     app.config.quasar_config["loadingBar"]["skipHijack"] = True  # a bar at the top, without a name for who hears it
     app.add_middleware(Guard, host=host, token=token)
     logging.getLogger("uvicorn.error").addFilter(is_trouble)
+    _add_pages(session, Home(session.runs))
     _add_files(session)
-
-    @ui.page("/")
-    async def page() -> None:
-        ui.add_head_html(f"{ENGLISH}{REMEMBERED}{SWITCHED_OFF}")
-        client = ui.context.client
-        await client.connected()  # before that the browser's tab is not known
-        if client.has_socket_connection:  # and after that it may be closed again
-            Page(session, app.storage.tab)
 
     serving = threading.Thread(target=_run, args=(host, port), name="server", daemon=True)
     serving.start()
@@ -82,6 +77,31 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
         if app.is_started:
             app.shutdown()
             serving.join()
+
+
+def _add_pages(session: Session, home: Home) -> None:
+    """Serve the page of the open run at `/`, and the home page at `/runs`, where `/` leads while no run is open."""
+
+    @ui.page("/")
+    async def run_page() -> Response | None:
+        if not session.is_open:
+            return RedirectResponse("/runs")
+        if await _connected():
+            Page(session, app.storage.tab)
+        return None
+
+    @ui.page("/runs")
+    async def home_page() -> None:
+        if await _connected():
+            HomePage(session, home, app.storage.tab)
+
+
+async def _connected() -> bool:
+    """Wait until the browser's tab is known. Return whether it is still there then."""
+    ui.add_head_html(f"{ENGLISH}{REMEMBERED}{SWITCHED_OFF}")
+    client = ui.context.client
+    await client.connected()
+    return client.has_socket_connection
 
 
 def is_trouble(record: logging.LogRecord) -> bool:

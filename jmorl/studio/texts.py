@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import accumulate
+from pathlib import Path
 
 import numpy as np
 
@@ -144,7 +145,7 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
 
 def title(view: View) -> str:
     """Name the browser's tab after the run, and say there that a question waits."""
-    return f"{'Your turn: ' if view.question else ''}{view.path.name} – jmorl studio"
+    return f"{'Your turn: ' if view.question else ''}{printable(view.path.name)} – jmorl studio"
 
 
 def facts(view: View, now: float) -> str:
@@ -205,9 +206,9 @@ def heading(view: View, selection: Selection) -> str:
     return f"You are asked when this round is over{unless}."
 
 
-def lost(view: View) -> str:
+def lost(folder: Path) -> str:
     """Say that the studio is gone, and what to do."""
-    return LOST.format(command=command("studio", view.path))
+    return LOST.format(command=printable(command("studio", folder)))
 
 
 def policy_name(view: View, policy_id: int, longest: int = LONGEST_NAME) -> str:

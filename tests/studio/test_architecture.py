@@ -17,6 +17,8 @@ NO_PANELS = {
     "jmorl.studio.panels.drawing",
     "jmorl.studio.panels.player",
 }  # what panels share
+TABS = {"jmorl.studio.tab", "jmorl.studio.home_tab"}
+PAGES = {"jmorl.studio.page", "jmorl.studio.home_page", "jmorl.studio.server"}
 
 
 def test_no_modules_of_the_studio_import_each_other_in_a_circle():
@@ -24,13 +26,13 @@ def test_no_modules_of_the_studio_import_each_other_in_a_circle():
 
 
 @pytest.mark.parametrize("panel", sorted(set(PANELS) - NO_PANELS))
-def test_a_panel_knows_no_other_panel_and_no_page(panel):
-    beside = STUDIO[panel] & (set(PANELS) | {"jmorl.studio.page", "jmorl.studio.server"})
+def test_a_panel_knows_one_tab_no_other_panel_and_no_page(panel):
+    beside = STUDIO[panel] & (set(PANELS) | PAGES)
     assert beside <= NO_PANELS
-    assert "jmorl.studio.tab" in STUDIO[panel]
+    assert len(STUDIO[panel] & TABS) == 1
 
 
-@pytest.mark.parametrize("module", ["jmorl.studio.tab", *modules(ROOT, "jmorl.studio.charts")])
+@pytest.mark.parametrize("module", [*sorted(TABS), *modules(ROOT, "jmorl.studio.charts")])
 def test_neither_the_tab_nor_a_chart_makes_widgets(module):
     path = modules(ROOT, "jmorl.studio")[module]
     widgets = {name for name in imported_names(path, module) if name.startswith("nicegui")} - {"nicegui.run"}
@@ -41,7 +43,7 @@ def test_an_installed_studio_has_the_files_of_its_pages():
     """NiceGUI is silent about a component whose file is missing."""
     data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]
     files = [path for path in (ROOT / "jmorl/studio").rglob("*") if path.suffix in (".js", ".css")]
-    assert {path.name for path in files} >= {"studio.css", "player.js", "policy_table.js"}
+    assert {path.name for path in files} >= {"studio.css", "player.js", "policy_table.js", "run_list.js"}
     for path in files:
         package = ".".join(path.parent.relative_to(ROOT).parts)
         assert any(fnmatch(path.name, pattern) for pattern in data.get(package, [])), path

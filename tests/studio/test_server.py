@@ -195,6 +195,25 @@ def test_the_address_is_printed_with_the_token(guarded, studio):
     assert f":{guarded.port}/?token=sesame" in guarded.log[-1] and "token" not in studio.log[-1]
 
 
+def test_over_a_folder_of_runs_nothing_is_open_and_every_door_leads_home(runs, chosen):
+    with Served(runs, "--token", "sesame", host="0.0.0.0") as served:
+        for door in ("/", "/runs"):
+            assert httpx.get(served.address + door).status_code == 401
+        with httpx.Client(follow_redirects=True) as browser:
+            home = browser.get(served.address + "/?token=sesame")
+            assert home.url.path == "/runs" and home.status_code == 200 and "<img src=x" not in home.text
+            for path in (
+                f"/policies/{run_of(runs)}/{chosen}.npz",
+                f"/episodes/{run_of(runs)}/{chosen}",
+                "/fronts/x.csv",
+            ):
+                assert browser.get(served.address + path).status_code == 404  # of no open run's history
+
+
+def test_the_home_page_is_there_beside_an_open_run(studio):
+    assert httpx.get(studio.address + "/runs").status_code == 200
+
+
 def test_a_port_that_is_taken_is_said_before_anything_is_made(studio, tmp_path, capsys):
     arguments = ["studio", "--port", str(studio.port), "--out", str(tmp_path / "run")]
     assert main(arguments) == 1

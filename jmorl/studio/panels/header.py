@@ -3,6 +3,7 @@
 from nicegui import ui
 
 from jmorl.studio import texts
+from jmorl.studio.home import printable
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -18,6 +19,7 @@ class Header:
         self.next_tick = 0.0  # on the session's clock
         with ui.element("h1").classes("brand"):
             ui.label("jmorl studio")
+        ui.link(texts.ALL_RUNS, "/runs").classes("all-runs")
         self.run_name = ui.label().classes("run-name")
         self.phase = ui.label().classes("phase").props('role="status"')
         with ui.element("div").classes("meter").props('role="progressbar" aria-label="Budget used"'):
@@ -34,7 +36,7 @@ class Header:
         title = texts.title(view)
         if self.titled.is_new(title):
             ui.page_title(title)
-        self.run_name.set_text(f"{view.noted.run.named(view.path.name)} · {view.config.env}")
+        self.run_name.set_text(f"{printable(view.noted.run.named(view.path.name))} · {view.config.env}")
         self.phase.set_text(texts.phase(view, now, session.leaving))
         self.facts.set_text(texts.facts(view, now))
         self.meter.style(f"width: {100 * texts.share_done(view, now):.1f}%")

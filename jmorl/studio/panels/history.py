@@ -9,6 +9,7 @@ from jmorl.display.readings import values_in_words
 from jmorl.display.text import plural
 from jmorl.studio import texts
 from jmorl.studio.history import Branch
+from jmorl.studio.home import printable
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 from jmorl.studio.view import View
@@ -49,9 +50,11 @@ class HistoryPanel:
         item = ui.element("div").classes("branch" + (" open" if is_open else "")).props('role="treeitem"')
         with item.style(f"margin-left: {18 * branch.depth}px"):
             with ui.element("div").classes("branch-head"):
-                ui.label(branch.title).classes("branch-name")
+                ui.label(printable(branch.title)).classes("branch-name")
                 edit = ui.button(icon="edit", on_click=lambda: self.tab.edit_run(branch))
-                edit.props("flat dense round size=xs").props["aria-label"] = f"name and note of {branch.name}"
+                edit.props("flat dense round size=xs").props["aria-label"] = (
+                    f"name and note of {printable(branch.name)}"
+                )
                 ui.label(_state(branch, is_open)).classes("branch-state")
                 if not is_open:
                     open_it = ui.button("Open", on_click=lambda: self.tab.switch(branch.run))
