@@ -29,13 +29,14 @@ class HomePage:
     def __init__(self, session: Session, home: Home, kept: MutableMapping[str, Any] | None = None):
         self.tab = tab = HomeTab(session, home, self._show, self._tell, self._go, kept)
         dress()
+        self.panels: list[Panel] = [Lost(lambda: home.folder)]
         with ui.element("div").classes("home") as self.root:
             with ui.element("header").classes("bar"):
                 with ui.element("h1").classes("brand"):
                     ui.label("jmorl studio")
                 ui.label(printable(home.folder)).classes("run-name")
                 ui.link(texts.NEW_RUN, "#new-run").classes("to-form")
-            self.panels: list[Panel] = [Lost(lambda: home.folder), OpenRun(tab)]
+            self.panels.append(OpenRun(tab))
             with ui.element("div").classes("home-main"):
                 self.panels += [RunList(tab), RunForm(tab)]
         self._show()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+import envs
+from envs.core import Objective
 from jmorl.display.commands import command
 from jmorl.display.readings import Writer, values_in_words, writers_for
 from jmorl.display.text import duration, front_question, minus, number, plural, short_count
@@ -441,8 +443,19 @@ def branch_of(origin: Origin | None) -> str:
 
 
 def result(facts: Facts) -> str:
-    """Return the scores of a run's result; nothing before the end."""
-    return minus(", ".join(f"{objective} {number(value)}" for objective, value in facts.scores))
+    """Return the scores of a run's result, as people say them; nothing before the end."""
+    read = {objective.name: objective for objective in _known_objectives(facts.env)}
+    told = [
+        f"{read[name].label} {number(float(read[name].read.of(value)))}" if name in read else f"{name} {number(value)}"
+        for name, value in facts.scores
+    ]
+    return minus(", ".join(told))
+
+
+@lru_cache
+def _known_objectives(env: str) -> tuple[Objective, ...]:
+    """Return the objectives of an environment of jmorl's own; nothing of any other, which a list does not import."""
+    return envs.make(env).objectives if envs.plain_id(env) == env and env in envs.ids() else ()
 
 
 def _generation(timeline: Timeline) -> int:

@@ -15,6 +15,7 @@ NO_PANELS = {
     "jmorl.studio.panels",
     "jmorl.studio.panels.panel",
     "jmorl.studio.panels.drawing",
+    "jmorl.studio.panels.lost",
     "jmorl.studio.panels.player",
 }  # what panels share
 TABS = {"jmorl.studio.tab", "jmorl.studio.home_tab"}
