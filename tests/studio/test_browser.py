@@ -252,7 +252,7 @@ def test_the_last_question_allows_every_policy_and_is_confirmed(browser, small, 
         if keep.count():
             keep.click()
             tab.page.get_by_text("End the run?").wait_for()
-            tab.page.get_by_role("button", name="Go on", exact=True).click()
+            tab.page.get_by_role("button", name="Not yet", exact=True).click()
             tab.page.get_by_text("End the run?").wait_for(state="hidden")
         outside = tab.page.locator(".policies-row.outside")
         assert outside.count()
