@@ -152,10 +152,13 @@ class Tab:
     def barriers(self, dialog=False):
         """Return what axe-core finds that keeps people out: rules broken, with an element that breaks each.
 
-        Of a dialog it takes the dimmed page for the ground, so that its contrasts are not judged.
+        Of a dialog it takes the dimmed page for the ground, so that its contrasts are not judged; nor are those of one
+        that is just fading away.
         """
         from axe_playwright_python.sync_playwright import Axe
 
+        if not dialog:
+            self.page.wait_for_function("!document.querySelector('.q-dialog')")
         options = {"rules": {"color-contrast": {"enabled": False}}} if dialog else None
         found = Axe().run(self.page, context=".q-card" if dialog else None, options=options).response["violations"]
         worst = [each for each in found if each["impact"] in ("serious", "critical")]

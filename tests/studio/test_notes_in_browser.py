@@ -69,7 +69,6 @@ def test_favourites_names_notes_and_branches_beside_each_other(browser, tmp_path
         tab.card(noted).get_by_text(MARKUP, exact=True).wait_for()
         other.rows().filter(has_text=MARKUP).wait_for()
         assert not (path / "decisions.jsonl").exists()  # what was typed is no command
-        tab.page.locator(".q-dialog").wait_for(state="detached")
         found["noted"] = tab.barriers()
         tab.screenshot("21-noted")
 
