@@ -1,6 +1,7 @@
 """How the studio feels, and what it costs; in a real browser. `make bench-studio` prints it and keeps it.
 
 interaction   from a click on a policy to the page that shows it, with a front of 2,000 policies of three objectives
+first look    from the click that begins a run in the form to its first policies on the page, with warm caches
 question      from the click on a choice to the page with the next question on MountainCar, less the generation's own
               time
 serving       how much longer the generations of a run take in the studio than those of `jmorl train`: with no page,
@@ -38,7 +39,8 @@ from jmorl.studio.view import Generation, View
 from tests.studio.browsing import chromium
 
 RESULTS = Path(__file__).parent / "studio.json"
-POLICIES, PORT, CLICKS, REPEATS = 2000, 8765, 20, 4
+POLICIES, PORT, CLICKS, REPEATS, LOOKS = 2000, 8765, 20, 4, 3
+BEGUN = ("mo-mountaincarcontinuous-v0", "mo-halfcheetah-v5")
 # Time in the browser, from a click on the n-th row in sight to the first picture that has the row and its card.
 CLICK = """(n) => new Promise((done) => {
   const row = document.querySelectorAll(".policies-row")[n], started = performance.now();
@@ -64,6 +66,7 @@ CHOOSE = """(question) => new Promise((done) => {
   observer.observe(heading, { characterData: true, childList: true, subtree: true });
   document.querySelector(".place.focus .choose").click();
 })"""
+WHAT = "still: serve a question about many policies, and no more; look: measure the first look alone"
 SERVED = ("alone", "served", "with a page", "with a policy playing")
 
 
@@ -152,6 +155,21 @@ def interaction() -> list[float]:
         return [float(page.evaluate(CLICK, number % 9)) for number in range(CLICKS)]
 
 
+def first_look(folder: Path, env: str) -> list[float]:
+    """Seconds from the click on *Begin* to the first policies, for some runs after one that warms the caches."""
+    waited = []
+    folder.mkdir()
+    for _ in range(1 + LOOKS):
+        with served("jmorl.cli", "studio", str(folder), "--port", str(PORT)), browser_page() as page:
+            page.get_by_label("Environment", exact=True).click()
+            page.get_by_role("option", name=env).click()
+            started = time.monotonic()
+            page.get_by_role("button", name="Begin").click()
+            page.get_by_text("still learning").first.wait_for(timeout=300_000)
+            waited.append(time.monotonic() - started)
+    return waited[1:]
+
+
 def question(folder: Path) -> list[float]:
     """Seconds between a choice and the next question that were not the generation's own."""
     waited = []
@@ -201,7 +219,7 @@ def _seconds(path: Path) -> np.ndarray:  # [G]
 def main() -> None:
     """Measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="?", choices=["still"], help="serve a question about many policies, and no more")
+    parser.add_argument("what", nargs="?", choices=["still", "look"], help=WHAT)
     parser.add_argument("--objectives", type=int, default=3, help="of that question")
     parser.add_argument("--label", default="objective", help="of these objectives, before their number")
     parser.add_argument("--host", default="127.0.0.1")
@@ -214,17 +232,25 @@ def main() -> None:
         serve(Still(POLICIES, options.objectives, options.label), options.host, options.port, None)
         return
     with tempfile.TemporaryDirectory() as folder:
+        looks = {env: first_look(Path(folder) / env, env) for env in BEGUN}
+        if options.what == "look":
+            kept = json.loads(RESULTS.read_text(encoding="utf-8"))
+            RESULTS.write_text(json.dumps({**kept, "first_look_seconds": looks}, indent=2) + "\n", encoding="utf-8")
+            return
         clicks, waits, seconds = interaction(), question(Path(folder)), serving(Path(folder))
     shares = {way: statistics.median(seconds[way]) / statistics.median(seconds["alone"]) - 1 for way in SERVED[1:]}
     results = {
         "machine": machine(),
         "interaction_milliseconds": {"median": statistics.median(clicks), "most": max(clicks)},
+        "first_look_seconds": looks,
         "question_seconds": {"median": statistics.median(waits), "most": max(waits)},
         "serving": {"seconds": seconds, "share": shares},
     }
     RESULTS.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
     table = Table("what", "median", "most")
     table.add_row(f"click, with {POLICIES} policies", f"{statistics.median(clicks):.0f} ms", f"{max(clicks):.0f} ms")
+    for env, found in looks.items():
+        table.add_row(f"Begin to first policies, {env}", f"{statistics.median(found):.1f} s", f"{max(found):.1f} s")
     table.add_row(
         "choice to next question, besides training", f"{statistics.median(waits):.2f} s", f"{max(waits):.2f} s"
     )
