@@ -32,7 +32,7 @@ from jmorl.methods.base import Method, Problem, Tasks, checked_tasks
 from jmorl.scoring import Scores, paper_scores, raw_scores
 from jmorl.search.bounds import members_within
 from jmorl.search.metrics import front_metrics
-from jmorl.search.policy import Policy, values_of
+from jmorl.search.policy import Policy, rescored, values_of
 from jmorl.search.scaling import REFERENCE_MARGIN, range_scale
 from jmorl.search.weights import candidate_grid
 from jmorl.state import RunState, reference_point
@@ -290,9 +290,8 @@ class _Run:
         if not episodes or not todo or evaluation.units == "paper":  # paper units would move
             return state, list(policies)
         scored, steps = confirmed(todo, self.population, _confirmation_key(self.config), episodes, evaluation.episodes)
-        by_id = {policy.id: policy for policy in scored}
         state = replace(state, evaluation_steps=state.evaluation_steps + steps)
-        return state, [by_id.get(policy.id, policy) for policy in policies]
+        return state, list(rescored(policies, scored))
 
     def _final_question(self, state: RunState, shown: Sequence[Policy]) -> Question:
         """Return the last question, which shows some of the archive: any other policy may be chosen, too."""

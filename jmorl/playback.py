@@ -35,6 +35,12 @@ class Recording:
         """T."""
         return len(self.totals) - 1
 
+    @property
+    def readings(self) -> np.ndarray:  # [T + 1, M]
+        """The totals as people say them."""
+        columns = zip(self.environment.objectives, self.totals.T, strict=True)
+        return np.stack([objective.read.so_far(column) for objective, column in columns], axis=1)
+
     def scene(self, step: int) -> Scene:
         """Return the picture after so many steps. Raises NoDrawing if the environment has none."""
         scene: Scene = self.environment.scene(jax.tree.map(lambda leaf: leaf[step], self.states))

@@ -153,9 +153,7 @@ def _time(recording: Recording, step: int) -> str:
 
 def _totals(recording: Recording, step: int) -> list[str]:
     """Return the objectives so far as people say them, in the same format throughout the episode, and never -0."""
-    columns = zip(recording.environment.objectives, recording.totals.T, strict=True)
-    readings = [objective.read.so_far(column) for objective, column in columns]
-    return [f"{column[step]:z{number_format(column)}}" for column in readings]
+    return [f"{column[step]:z{number_format(column)}}" for column in recording.readings.T]
 
 
 @cache

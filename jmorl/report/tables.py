@@ -25,7 +25,7 @@ from jmorl.display.text import (
 )
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.search.metrics import coverage
-from jmorl.search.policy import values_of
+from jmorl.search.policy import rescored, values_of
 from jmorl.search.prediction import COVERAGE
 from jmorl.storage.notes_file import Note
 from jmorl.storage.policy_file import policy_name
@@ -35,8 +35,8 @@ from jmorl.storage.stored_run import StoredRun
 def run_tables(run: StoredRun) -> list[RenderableType]:
     """Heading, metrics, decisions and final front of a run, to be printed one after the other."""
     decisions = [decisions_table(run)] if run.decisions else []
-    chosen = run.chosen  # with its confirmed score
-    members = [chosen if chosen and policy.id == chosen.id else policy for policy in run.front]
+    chosen = run.chosen
+    members = rescored(run.front, filter(None, [chosen]))
     noted = {policy_id: _noted(note) for policy_id, note in run.notes.policies.items()}
     front = front_table(members, run.objectives, chosen.id if chosen else None, noted=noted)
     front.title = "Final front" if run.result else "Front so far"

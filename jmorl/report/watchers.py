@@ -19,7 +19,7 @@ from jmorl.display.text import REASONS, duration, number, plural, short_count
 from jmorl.events import Blended, Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.search.families import Blending
-from jmorl.search.policy import Confirmation, Policy
+from jmorl.search.policy import Confirmation, Policy, rescored
 
 
 class Watcher(ABC):
@@ -254,9 +254,7 @@ def _more_of_answer(decided: Decided) -> str:
 
 def show_result(console: PlainConsole, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
     """Show the final front, with the chosen policy marked."""
-    chosen = event.chosen  # with its confirmed score
-    front = [chosen if policy.id == chosen.id else policy for policy in event.state.archive.members]
-    table = front_table(front, objectives, chosen.id)
+    table = front_table(rescored(event.state.archive.members, [event.chosen]), objectives, event.chosen.id)
     table.title = "Final front"
     console.print()
     console.print(table)

@@ -1,6 +1,6 @@
 """One evaluated policy: where it came from, what it scores, and the learner's state behind it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -50,6 +50,12 @@ class Policy:
     raw: np.ndarray | None = None  # [M] mean undiscounted return, where `values` are in other units; else None
     confirmation: Confirmation | None = None  # of `values` and `std`, where they are confirmed
     blend: Blend | None = None  # for a policy that was not trained, but mixed
+
+
+def rescored(policies: Iterable[Policy], scored: Iterable[Policy]) -> tuple[Policy, ...]:
+    """Return the policies, those among them that were scored anew with these scores."""
+    by_id = {policy.id: policy for policy in scored}
+    return tuple(by_id.get(policy.id, policy) for policy in policies)
 
 
 def values_of(policies: Sequence[Policy]) -> np.ndarray:  # [N, M]

@@ -158,10 +158,9 @@ def branch(
     """Make a new run, in the folder `out`, that begins where a run was after a generation.
 
     It has the earlier run's logs, and the notes about its policies, up to there, and decides for itself from then on,
-    at once. `user` says who, if not as
-    before: what somebody else has said then counts no more. `steps` says how many environment steps it may use, those
-    before it included. Raises CannotContinue, FolderInUse, NewerFormat, NotAsDeclared and, if the user does not fit or
-    has a script that cannot be read, ConfigError; nothing is made then.
+    at once. `user` says who, if not as before: what somebody else has said then counts no more. `steps` says how many
+    environment steps it may use, those before it included. Raises CannotContinue, FolderInUse, NewerFormat,
+    NotAsDeclared and, if the user does not fit or has a script that cannot be read, ConfigError; nothing is made then.
     """
     path, out = Path(path), Path(out)
     manifest, config = read_start(path)

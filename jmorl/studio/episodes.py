@@ -7,8 +7,6 @@ them.
 from math import ceil
 from typing import Any
 
-import numpy as np
-
 from jmorl.playback import Recording
 from jmorl.report.playback import STEP_SECONDS
 
@@ -29,8 +27,7 @@ def episode_json(recording: Recording) -> dict[str, Any]:
     steps = [*range(0, recording.steps, stride), recording.steps]
     scenes = [recording.scene(step).to_json() for step in steps]
     still = _still(scenes)
-    columns = zip(recording.environment.objectives, recording.totals.T, strict=True)
-    totals = np.stack([objective.read.so_far(column) for objective, column in columns], axis=1)
+    totals = recording.readings
     frames = [
         {
             "step": step,

@@ -25,7 +25,7 @@ from jmorl.loop import make_method
 from jmorl.methods.base import MethodError, Prospect
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
-from jmorl.search.policy import Policy
+from jmorl.search.policy import Policy, rescored
 from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
@@ -141,8 +141,7 @@ class Session:
 
     def ask(self, question: Question) -> None:
         """Open a question of the run. Scores that were confirmed for it are those of the front from now on."""
-        asked = {policy.id: policy for policy in question.whole.front}
-        front = tuple(asked.get(policy.id, policy) for policy in self.view.front)
+        front = rescored(self.view.front, question.whole.front)
         self.prospects, self._worked_out = {}, set()
         self._change(question=question, bounds=question.bounds, front=front, asking=None)
 

@@ -20,7 +20,7 @@ from jmorl.display.text import REASONS
 from jmorl.events import Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.search.archive import Archive
-from jmorl.search.policy import Policy, values_of
+from jmorl.search.policy import Policy, rescored, values_of
 from jmorl.state import RunState
 from jmorl.storage.layout import Layout
 from jmorl.storage.manifest import read_manifest
@@ -132,7 +132,7 @@ def stored_view(path: Path) -> View:
     return replace(
         nothing,
         generations=_generations(stored, archives),
-        front=_with(stored.front, stored.chosen) if stored.chosen else stored.front,
+        front=rescored(stored.front, filter(None, [stored.chosen])),
         replaced=_replaced([policy for archive in archives for policy in archive.members], stored.front),
         bounds=stored.bounds[-1],
         previous=stored.policies[decisions[-1].policy] if decisions else None,
@@ -169,14 +169,9 @@ def after(view: View, event: Event, now: float) -> View:
             equal = event.answer.equal and not getattr(event.question, "again", False)  # else their own choice stands
             return replace(view, answered=generation, stand_in=EQUAL if equal else "")
         case RunFinished():
-            front = _with(view.front, event.chosen)
+            front = rescored(view.front, [event.chosen])
             return replace(view, front=front, result=event.chosen, reason=REASONS[event.reason], timeline=None)
     return view
-
-
-def _with(front: tuple[Policy, ...], scored: Policy) -> tuple[Policy, ...]:
-    """Return the front with a policy as it was scored last."""
-    return tuple(scored if policy.id == scored.id else policy for policy in front)
 
 
 def _reason(event: Decided) -> str:
