@@ -81,8 +81,39 @@ def test_the_score_is_that_of_the_policy_alone(events, config):
     [alone], _ = confirmed(policies[1:2], population, key, 5, 2)
     assert alone.confirmation.episodes == 6  # whole calls of 2
     np.testing.assert_allclose(alone.values, together[1].values, rtol=1e-6)
-    error = 2.5758 * alone.std / np.sqrt(5)
+    returns = episodes_of(policies[1:2], population, key, calls=3, at_once=2)[0]
+    np.testing.assert_allclose(alone.std, returns.std(axis=0), rtol=1e-4)
+    oddest = np.abs(returns - returns.mean(axis=0)).max(axis=0)
+    error = 2.5758 * np.sqrt((alone.std**2 + oddest**2 / 6) / 5)
     np.testing.assert_allclose(alone.confirmation.error, error, rtol=1e-4)
+
+
+def test_the_error_allows_for_what_happened_to_the_others(events, config):
+    """A policy may do on other starts what a policy beside it was seen to do."""
+    policies = events[-1].state.archive.members
+    population = Population(envs.make(config.env), config.learning)
+    key = jax.random.key(3)
+    returns = episodes_of(policies, population, key, calls=3, at_once=2)
+    apart = np.abs(returns - returns.mean(axis=1, keepdims=True)).max(axis=1)  # [N, M]
+    calmest, oddest = np.argmin(apart[:, 0]), apart.max(axis=0)
+    together, _ = confirmed(policies, population, key, 5, 2)
+    error = 2.5758 * np.sqrt((returns[calmest].std(axis=0) ** 2 + oddest**2 / 6) / 5)
+    np.testing.assert_allclose(together[calmest].confirmation.error, error, rtol=1e-4)
+    [alone], _ = confirmed([policies[calmest]], population, key, 5, 2)
+    assert alone.confirmation.error[0] < together[calmest].confirmation.error[0]
+
+
+def episodes_of(policies, population, key, calls, at_once):
+    """Returns [N, calls * at_once, M] of the policies, played one after the other."""
+    found = []
+    for policy in policies:
+        agents = jax.tree.map(lambda leaf: np.stack([leaf] * population.size), policy.snapshot)
+        each = [
+            population.evaluate(agents, jax.random.split(jax.random.fold_in(key, call), at_once)).undiscounted[0]
+            for call in range(calls)
+        ]
+        found.append(np.concatenate(each))
+    return np.array(found, np.float64)
 
 
 def test_a_run_that_somebody_stops_confirms_its_result(config):

@@ -14,7 +14,7 @@ class Confirmation:
     claimed: np.ndarray  # [M] the score that the search went by
     claimed_std: np.ndarray  # [M] its standard deviation over the evaluation episodes
     episodes: int  # fresh ones, of the score that is confirmed
-    error: np.ndarray  # [M] of it: the mean over all starts is within in 99 of 100 cases
+    error: np.ndarray  # [M] of it: the mean over all starts is within in 99 of 100 cases; see jmorl/confirmation.py
 
 
 @dataclass(frozen=True)
