@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from envs import Objective
     from jmorl.config import Config, ConfigError, resolve
-    from jmorl.decision.answers import Adjust, Answer, AnswerError, Back, Choose, PointAnswer
+    from jmorl.decision.answers import Adjust, Answer, AnswerError, AskPair, Back, Choose, PointAnswer, Skip
     from jmorl.decision.navigation import NavigationFinished, PointDecided, navigate
     from jmorl.decision.protocol import (
         AnyQuestion,
@@ -46,6 +46,7 @@ __all__ = [
     "Answer",
     "AnswerError",
     "AnyQuestion",
+    "AskPair",
     "Back",
     "Blend",
     "Blended",
@@ -79,6 +80,7 @@ __all__ = [
     "RunFolder",
     "RunState",
     "Seconds",
+    "Skip",
     "Tasks",
     "TrainingFault",
     "WeightQuestion",
@@ -101,7 +103,7 @@ __all__ = [
 # read, and the command line is to say so.
 _HOMES = {
     "jmorl.config": "Config ConfigError resolve",
-    "jmorl.decision.answers": "Adjust Answer AnswerError Back Choose PointAnswer",
+    "jmorl.decision.answers": "Adjust Answer AnswerError AskPair Back Choose PointAnswer Skip",
     "jmorl.decision.navigation": "NavigationFinished PointDecided navigate",
     "jmorl.decision.protocol": "AnyQuestion DecisionMaker PairQuestion PointQuestion Question WeightQuestion",
     "jmorl.evaluation": "export_blend",

@@ -72,8 +72,7 @@ def run(
     _check_kind("environment", environment, Environment, "as `envs.make` returns it")
     decision_maker = decision_maker or make_user(config.user, environment.objectives)
     _check_kind("decision_maker", decision_maker, DecisionMaker, "an instance of a subclass")
-    if config.ask == "unsure" or config.question != "front":
-        decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question, ask_now)
+    decision_maker = StandIn(decision_maker, config.seed, history, config.ask, config.question, ask_now)
     population = population or Population(environment, config.learning)
     check_same(environment, envs.make(config.env), config.env)
     return _Run(config, environment, decision_maker, population, selecting).events(state, early)

@@ -50,6 +50,22 @@ class Answer:
             object.__setattr__(self, name, value)
 
 
+class Instead(Exception):
+    """What a decision maker raises instead of an answer. `limits` as in an `Answer`: they hold from now on."""
+
+    def __init__(self, limits: tuple[float, ...] | None = None):
+        super().__init__(type(self).__doc__)
+        self.limits = limits
+
+
+class Skip(Instead):
+    """Go on without an answer: the stand-in chooses by the earlier ones, and nothing is learnt from this question."""
+
+
+class AskPair(Instead):
+    """Ask about two policies instead: the pair whose comparison tells most."""
+
+
 @dataclass(frozen=True)
 class Choose:
     """Move on to a point, by its index among those shown."""

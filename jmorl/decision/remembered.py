@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from jmorl.decision.answers import AskPair
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Question
 from jmorl.decision.records import AnswerRecord, DecisionRecord
 from jmorl.decision.wrapper import Wrapper
@@ -32,15 +33,20 @@ class Remembered(Wrapper):
         self.asking = asking
 
     def respond(self, question: AnyQuestion) -> Any:
-        """Return the answer to a question of any kind."""
-        if self.remembers(question):
+        """Return the answer to a question of any kind. Raises AskPair where the record is of a pair of its policies."""
+        if self._is_next(question):
             return answer_in(self.records.pop(0), question)
+        if self.remembers(question):
+            raise AskPair
         self.records.clear()
         with self.asking():
             return self.user.respond(question)
 
     def remembers(self, question: AnyQuestion) -> bool:
-        """Return whether the next record is of this question."""
+        """Return whether the next record is of this question, or of a pair of its policies."""
+        return self._is_next(question) or (bool(self.records) and is_of_pair(self.records[0], question))
+
+    def _is_next(self, question: AnyQuestion) -> bool:
         whole = question.whole if isinstance(question, Question) else question  # which somebody may have seen
         return bool(self.records) and (is_of(self.records[0], question) or is_of(self.records[0], whole))
 
@@ -58,6 +64,19 @@ def is_of(record: RunRecord, question: AnyQuestion) -> bool:
     if [shown.policy for shown in record.shown] != [policy.id for policy in question.shown]:
         return False
     return np.allclose([shown.values for shown in record.shown], question.values)
+
+
+def is_of_pair(record: RunRecord, question: AnyQuestion) -> bool:
+    """Return whether the record is an answer about a pair, for which somebody asked in place of this question."""
+    if not isinstance(question, Question) or question.form == "pair" or question.again or question.purpose != "steer":
+        return False
+    values = {policy.id: policy.values for policy in question.whole.front}
+    return (
+        isinstance(record, DecisionRecord)
+        and (record.purpose, record.generation) == (question.purpose, question.generation)
+        and len(record.shown) == 2
+        and all(each.policy in values and np.allclose(each.values, values[each.policy]) for each in record.shown)
+    )
 
 
 def by_stand_in(record: RunRecord) -> bool:

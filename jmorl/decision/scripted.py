@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from jmorl.decision.answers import Answer, Choose, PointAnswer
+from jmorl.decision.answers import Answer, AskPair, Choose, PointAnswer
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, PointQuestion, Question
 from jmorl.decision.records import AnswerRecord, DecisionRecord, PointRecord, ScriptError, read_log
 from jmorl.decision.remembered import is_of
@@ -48,7 +48,7 @@ class ScriptedUser(DecisionMaker):
         )
 
     def answer(self, question: Question) -> Answer:
-        """Return the preferred member of the question's front."""
+        """Return the preferred member of the question's front. Raises AskPair where the log has a pair instead."""
         generation, again = question.generation, int(question.again)
         logs = (self._steering, self._final) if question.purpose == "steer" else (self._final,)
         found = [log[place] for place in ((generation, again), (generation, 0)) for log in logs if place in log]
@@ -60,6 +60,8 @@ class ScriptedUser(DecisionMaker):
                 f"{self.path} has no decision for generation {question.generation}, only for {generations}; add that "
                 "decision to it, or replay it with the settings of the run that wrote it"
             )
+        if steering and _is_about_pair(record) and question.form != "pair" and len(question.whole.front) > 2:
+            raise AskPair
         policies = question.whole.front
         index = self._find(record.policy, record.values, policies, question.generation)
         stop = record.stop or (question.purpose == "steer" and not steering)
@@ -120,6 +122,13 @@ class ScriptedUser(DecisionMaker):
                 "policy is shown here: the log is of another run; compare environment, seed and settings"
             )
         return min(matches)[-1]
+
+
+def _is_about_pair(record: DecisionRecord) -> bool:
+    """Return whether a pair was asked about: then the run may have gone on with a third policy."""
+    return (
+        len(record.shown) == 2 and not record.again and not record.stand_in and (bool(record.ranking) or record.equal)
+    )
 
 
 def _timeline(records: Iterable[R]) -> dict[tuple[int, int], R]:

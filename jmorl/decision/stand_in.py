@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from jmorl.decision.answers import Answer
+from jmorl.decision.answers import Answer, AnswerError, Instead, Skip
 from jmorl.decision.preferences import Comparison, PreferenceModel, Verdict
 from jmorl.decision.protocol import AnyQuestion, DecisionMaker, Form, Question
 from jmorl.decision.records import DecisionRecord, decision_record
@@ -25,6 +25,7 @@ TRUSTED_REGRET = {"steer": 0.07, "final": 0.02}
 DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
 FEWEST_AGAINST = 2  # other answers that it may be against
 EARLIER_ANSWERS = "your earlier answers speak for it, and asking you could hardly improve on it"
+SKIPPED = "you skipped the question, and it is the best by your earlier answers"
 FEW = 5  # policies in a short question
 
 
@@ -35,9 +36,12 @@ class StandIn(Wrapper):
     never is, nor at the end for a user who signs. With `shows` "few" it asks about few policies at a time: the best by
     expectation, the one that was chosen last, and those whose comparison tells most; with "rank" for their order; with
     "pair" about two, after which it goes on with the best by expectation, and at the end about few: the result is what
-    the user chooses. `history` has the records of a run that goes on; only what the user said themselves counts. The
-    same answers give the same posterior. With `ask_now` it leaves the next question to the user, however sure it is: so
-    somebody takes back what it has answered.
+    the user chooses. A user who raises `AskPair` at a question that steers is asked about a pair this once; one who
+    raises `Skip` leaves the choice to the stand-in.
+
+    `history` has the records of a run that goes on; only what the user said themselves counts. The same answers give
+    the same posterior. With `ask_now` it leaves the next question to the user, however sure it is: so somebody takes
+    back what it has answered.
     """
 
     def __init__(
@@ -54,11 +58,11 @@ class StandIn(Wrapper):
         history = list(history)
         own = [each for each in history if isinstance(each, DecisionRecord) and not by_stand_in(each)]
         self.answers = [answer for answer in map(_said, own) if answer]
-        self.limits = next((each.answer.limits for each in reversed(own) if each.limits), None)
         self.ask = "always" if user.patient else ask
         self.shows = shows
         self.ask_now = ask_now
         decisions = [each for each in history if isinstance(each, DecisionRecord)]
+        self.limits = next((each.answer.limits for each in reversed(decisions) if each.limits), None)
         self.chose_last = bool(decisions) and by_stand_in(decisions[-1])
 
     def decide(self, question: AnyQuestion) -> tuple[AnyQuestion, Any]:
@@ -70,10 +74,12 @@ class StandIn(Wrapper):
             return question, self.user.respond(question)
         question = replace(question, previous_by_stand_in=self.chose_last)
         if question.again:
-            return self._asked(question)
+            return self._heard(question, question)
         if len(question.front) == 1 and self.ask == "unsure" and self._reachable(question):
             self.chose_last = True
             return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
+        if self.ask == "always" and self.shows == "front":
+            return self._heard(question, question)
         model = self._model(question)
         verdict = model.verdict()
         asked = self._shortened(question, model, verdict)
@@ -81,7 +87,26 @@ class StandIn(Wrapper):
             self.chose_last = True
             return question, Answer(question.front[verdict.best].id, stand_in=True, reason=EARLIER_ANSWERS)
         self.ask_now = False
-        return self._asked(asked)
+        return self._heard(question, asked)
+
+    def _heard(self, question: Question, asked: Question) -> tuple[Question, Answer]:
+        """Ask the user. Where they want something else instead, skip the question, or ask about a pair of it."""
+        try:
+            return self._asked(asked)
+        except Instead as instead:
+            if question.purpose != "steer" or question.again:
+                raise AnswerError("this question can neither be skipped nor be asked about a pair") from instead
+            self.limits = instead.limits or self.limits
+            question = replace(question, limits=self.limits)
+            model = self._model(question)
+            if isinstance(instead, Skip):
+                self.chose_last = True
+                best = question.front[model.verdict().best].id
+                return question, Answer(best, stand_in=True, reason=SKIPPED, limits=instead.limits)
+            if asked.form == "pair" or len(question.front) == 1:
+                raise AnswerError("there is no other pair to ask about") from instead
+            asked, answer = self._heard(question, _about(question, model.sampled_pair(), "pair"))
+            return asked, replace(answer, limits=answer.limits or instead.limits)
 
     def _asked(self, asked: Question) -> tuple[Question, Answer]:
         """Ask the user, and take note of what they say. Return the question as they saw it, and the answer."""
@@ -92,6 +117,9 @@ class StandIn(Wrapper):
         if asked.form == "pair" and not answer.ranking and not answer.equal and _is_shown(asked, answer.policy):
             answer = replace(answer, ranking=(answer.policy,))
         self.limits = answer.limits or self.limits
+        if answer.stand_in:  # a log of a question that was skipped
+            self.chose_last = True
+            return asked, answer
         said = _said(decision_record(asked, asked.checked(answer)))
         self.answers += [said] if said else []
         if answer.equal and asked.again:  # they see no reason to take back what they have just chosen
@@ -154,12 +182,17 @@ class StandIn(Wrapper):
             ids = [policy.id for policy in question.front]
             previous = [ids.index(question.previous)] if question.previous in ids else []
             rows = model.telling(FEW, [verdict.best, *previous])
-        few = tuple(question.front[row] for row in rows)
-        return replace(question, front=few, others=_without(question.whole.front, few), form=FORMS[shows])
+        return _about(question, rows, FORMS[shows])
 
     def respond(self, question: AnyQuestion) -> Any:
         """Return the answer to a question of any kind."""
         return self.decide(question)[1]
+
+
+def _about(question: Question, rows: Sequence[int], form: Form) -> Question:
+    """Return the question about some of its policies; the others may be chosen, too."""
+    few = tuple(question.front[row] for row in rows)
+    return replace(question, front=few, others=_without(question.whole.front, few), form=form)
 
 
 def _without(policies: Sequence[Policy], some: Sequence[Policy]) -> tuple[Policy, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from envs.core import Objective
-from jmorl.decision.answers import Adjust, Answer, Back, Choose, PointAnswer
+from jmorl.decision.answers import Adjust, Answer, AskPair, Back, Choose, Instead, PointAnswer, Skip
 from jmorl.decision.protocol import DecisionMaker, PointQuestion, Question
 from jmorl.decision.terminal_view import show_front, show_points
 from jmorl.display.console import PlainConsole
@@ -23,6 +23,8 @@ jmorl branch RUN --generation K --out NEW.
   Enter        keep the last choice: none of these is better
   12 4 9       prefer policy 12, then 4, then 9, to all others
   same         no difference between these
+  pair         ask me about two of them instead: the two whose comparison tells most
+  skip         I cannot say: go on by my earlier answers
   {limit}
                rule out what does not reach this; none takes it back
   {best:<12} list the policies that are best in an objective first
@@ -43,7 +45,7 @@ class TerminalUser(DecisionMaker):
     """Shows each question on `console` and takes the answer from `read`, which is given a prompt as `input` is.
 
     An answer that makes no sense is explained and asked for again. Raises EOFError if the input ends when there is no
-    choice to end the run with.
+    choice to end the run with, and `Instead` where the person wants to skip a question, or be asked about a pair.
     """
 
     signs = True
@@ -69,6 +71,9 @@ class TerminalUser(DecisionMaker):
                     return replace(reply, limits=None if question.limits == limits else question.limits)
                 case Answer():
                     return replace(reply, limits=None if question.limits == limits else question.limits)
+                case Instead():
+                    reply.limits = None if question.limits == limits else question.limits
+                    raise reply
                 case tuple():
                     question = replace(question, limits=reply)
                     show_front(self.console, question, by=0)
@@ -113,10 +118,11 @@ def _prompt(question: Question) -> str:
     return "policy (? for help) > "
 
 
-def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, ...] | str:
-    """Return what a line means: an answer, an objective's index to list by, limits, or a sentence to say and ask again.
+def policy_reply(question: Question, line: str) -> Answer | Instead | int | tuple[float, ...] | str:
+    """Return what a line means: an answer, what is wanted instead, an objective to list by, limits, or what to say.
 
-    Limits [M] are those from now on, -inf where there is none.
+    An objective is its index. What is said is a sentence, after which the question is asked again. Limits [M] are those
+    from now on, -inf where there is none.
     """
     words = line.lower().replace("−", "-").replace(",", " ").replace(">", " ").split()
     name = question.objectives[-1].name
@@ -132,6 +138,8 @@ def policy_reply(question: Question, line: str) -> Answer | int | tuple[float, .
     if words == ["same"]:
         kept = question.previous in [policy.id for policy in question.whole.front]
         return Answer(question.previous if kept and question.previous is not None else question.front[0].id, equal=True)
+    if words in (["skip"], ["pair"]):
+        return _instead(question, words[0])
     ranking = _ranking(question, words)
     if isinstance(ranking, str):
         return ranking
@@ -181,6 +189,19 @@ def point_reply(question: PointQuestion, line: str) -> PointAnswer | str:
         case [word] if (chosen := _number(word)) and chosen <= shown:
             return Choose(chosen - 1)
     return f"Choose a point by its number, 1 to {shown}; ? lists what else you can type."
+
+
+def _instead(question: Question, word: str) -> Instead | str:
+    """Return what the word asks for, or why this question does not have it."""
+    if question.purpose != "steer":
+        return "This question has to be answered: the policy that you choose is the result."
+    if question.again:
+        return "Choose one of the two. With same, what you have just chosen stays."
+    if word == "skip":
+        return Skip()
+    if question.form == "pair":
+        return "This question is about two policies already."
+    return AskPair() if len(question.whole.front) > 2 else "There are no more than two policies."
 
 
 def _policy(question: Question, named: str | None) -> int | str:

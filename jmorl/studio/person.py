@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from jmorl.decision.answers import Answer
+from jmorl.decision.answers import Answer, Instead
 from jmorl.decision.protocol import DecisionMaker, Question
 
 
@@ -24,32 +24,37 @@ class Person(DecisionMaker):
         self.asked = asked
         self._changed = threading.Condition()
         self._question: Question | None = None
-        self._answer: Answer | None = None
+        self._answer: Answer | Instead | None = None
         self._left = False
         self._wants_question = False
         self._ending: int | None = None  # the policy that the next question is answered with
 
     def answer(self, question: Question) -> Answer:
-        """Return somebody's reply. Raises LeftOff when the run is left instead."""
+        """Return somebody's reply, or raise it where it is no answer. Raises LeftOff when the run is left instead."""
         with self._changed:
-            self._question, self._answer = question, self._answer_beforehand(question)
+            beforehand = self._answer_beforehand(question)
+            self._question, self._answer = question, beforehand
             self._wants_question, self._ending = False, None
-            if self._answer:
-                return self._answer
+            if beforehand:
+                return beforehand
         self.asked(question)
         with self._changed:
             self._changed.wait_for(lambda: self._answer is not None or self._left)
             self._question = None
             if self._answer is None:
                 raise LeftOff
+            if isinstance(self._answer, Instead):
+                raise self._answer
             return self._answer
 
-    def reply(self, question: Question, answer: Answer) -> bool:
-        """Answer a question. Return False if it is not open: somebody else was first, or the run was left.
+    def reply(self, question: Question, answer: Answer | Instead) -> bool:
+        """Answer a question, or say what is wanted instead.
 
-        Raises ValueError, and the question stays open, if its front has no such policy.
+        Return False if it is not open: somebody else was first, or the run was left. Raises ValueError, and the
+        question stays open, if its front has no such policy.
         """
-        question.policy(answer.policy)
+        if isinstance(answer, Answer):
+            question.policy(answer.policy)
         with self._changed:
             if question is not self._question or self._answer is not None or self._left:
                 return False

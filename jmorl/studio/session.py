@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import envs
-from jmorl.decision.answers import Answer, AnswerError, PointAnswer
+from jmorl.decision.answers import Answer, AnswerError, Instead, PointAnswer
 from jmorl.decision.protocol import Question
 from jmorl.events import RunFinished
 from jmorl.learning.population import TrainingFault
@@ -145,8 +145,11 @@ class Session:
         self.prospects, self._worked_out = {}, set()
         self._change(question=question, bounds=question.bounds, front=front, asking=None)
 
-    def answer(self, question: Question, answer: Answer) -> bool:
-        """Answer the open question. Return False if it is open no more. Raises ValueError if it has no such policy."""
+    def answer(self, question: Question, answer: Answer | Instead) -> bool:
+        """Answer the open question, or say what is wanted instead.
+
+        Return False if it is open no more. Raises ValueError if it has no such policy.
+        """
         return self._person is not None and self._person.reply(question, answer)
 
     def ask_now(self) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar
 
 from nicegui import run
 
-from jmorl.decision.answers import Answer, PointAnswer
+from jmorl.decision.answers import Answer, AskPair, Instead, PointAnswer, Skip
 from jmorl.decision.protocol import PointQuestion, Question
 from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
@@ -165,6 +165,16 @@ class Tab:
             kept = last.id if last and self.view.choosable(last.id) else question.front[0].id
             self.answer(question, Answer(kept, generations=self.generations, equal=True))
 
+    def skip(self) -> None:
+        """Have the open question answered by the earlier answers."""
+        if self.view.question:
+            self.answer(self.view.question, Skip())
+
+    def ask_pair(self) -> None:
+        """Have a question about two policies in place of the open one."""
+        if self.view.question:
+            self.answer(self.view.question, AskPair())
+
     def limit(self, objective: int, least: float | None) -> None:
         """Set what an objective must reach, from the next answer on for the search, too; None: anything."""
         limits = list(self.selection.limits or [-math.inf] * len(self.view.objectives))
@@ -222,13 +232,16 @@ class Tab:
         """Go on where the run ended, for some more generations, in a branch."""
         await self._in_background(self.session.train_on, max(rounds, 1))
 
-    def answer(self, question: Question, answer: Answer) -> None:
+    def answer(self, question: Question, answer: Answer | Instead) -> None:
         """Answer a question that this tab has shown, with the limits set in it; a second click does nothing more."""
         if question is self._settled:
             return
         self._settled, self._limited = question, False
-        if self.selection.limits != question.limits:
-            answer = replace(answer, limits=self.selection.limits)
+        limits = None if self.selection.limits == question.limits else self.selection.limits
+        if isinstance(answer, Instead):
+            answer.limits = limits
+        else:
+            answer = replace(answer, limits=limits)
         if not self.session.answer(question, answer):
             self.tell("This question is already answered, in another tab; nothing has changed.", "warning")
 

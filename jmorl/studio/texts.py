@@ -38,6 +38,15 @@ INTRODUCTION = (
     " final: you can go back to any earlier question."
 )
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
+SKIP, SKIP_HINT = (
+    "Skip",
+    "You cannot say: the search goes on by your earlier answers, and learns nothing from this one.",
+)
+COMPARE_TWO = "Compare two"
+COMPARE_TWO_HINT = (
+    "You are asked about two policies instead, those whose comparison tells most. Training then goes on from the "
+    "policy that all your answers so far speak for."
+)
 ASK_NOW_HINT = "The next question comes when this round is over."
 TAKE_BACK_HINT = "You are asked the question that was answered for you, in a new branch."
 MORE_FILES = {
@@ -272,6 +281,12 @@ def keep(view: View) -> str:
 def offers_equal(view: View) -> bool:
     """Return whether the open question is about two policies."""
     return view.question is not None and (view.question.form == "pair" or view.question.again)
+
+
+def offers_pair(view: View) -> bool:
+    """Return whether two policies could be asked about in place of the open question."""
+    question = view.question
+    return question is not None and question.form != "pair" and not question.again and len(question.whole.front) > 2
 
 
 def end_with(view: View, selection: Selection, policy: Policy) -> str:

@@ -10,8 +10,9 @@ import pytest
 import envs
 from jmorl import Decided, DecisionMaker, PairQuestion, branch, read_run, resume, run
 from jmorl.cli import main
-from jmorl.decision.answers import Answer
+from jmorl.decision.answers import Answer, AnswerError, AskPair, Skip
 from jmorl.decision.records import DecisionRecord, ScriptError, from_json, record_of, to_json
+from jmorl.decision.remembered import Remembered
 from jmorl.decision.scripted import ScriptedUser
 from jmorl.decision.stand_in import DOUBTED_REGRET, TRUSTED_REGRET, StandIn
 from jmorl.decision.terminal import TerminalUser
@@ -430,6 +431,10 @@ def varied(question):
             return replace(answer, limits=(40.0, -np.inf))
         case 6:
             return Answer(question.whole.front[-1].id)
+        case 7:
+            raise Skip(limits=(30.0, -np.inf))
+        case 8 if question.form != "pair":
+            raise AskPair
     return answer
 
 
@@ -446,6 +451,90 @@ def test_who_knows_the_records_goes_on_as_who_was_there(growing, shows, decides)
         decided, previous = live(lived, part, previous)
         assert as_seen(found) == as_seen(decided)
         past += decided
+
+
+# --- somebody who wants something else than to answer --------------------------------------------------------------
+
+
+def test_who_skips_a_question_goes_on_with_the_best_by_their_earlier_answers(growing):
+    def says(question):
+        if question.generation > 4:
+            raise Skip
+        return chooses(question)
+
+    stand_in: Any = StandIn(Says(says), 1, ask="always")
+    decided, _ = live(stand_in, growing(6))
+    known = len(stand_in.answers)
+    for asked, answer in decided[4:]:
+        worth = asked.values @ np.array([0.3, 0.7])
+        assert answer.stand_in and "skipped" in answer.reason
+        assert worth.max() - worth[[policy.id for policy in asked.front].index(answer.policy)] < 0.05 * np.ptp(worth)
+    assert known == 4 and stand_in.chose_last
+
+
+def test_limits_that_are_set_with_a_skip_hold_at_once_and_later(growing):
+    def says(question):
+        raise Skip(limits=(60.0, -np.inf))
+
+    decided, _ = live(StandIn(Says(says), 1, ask="always"), growing(1))
+    asked, answer = decided[0]
+    assert answer.limits == (60.0, -np.inf) and asked.policy(answer.policy).values[0] >= 60
+    assert StandIn(Says(None), 1, written(decided)).limits == (60.0, -np.inf)
+
+
+def test_who_asks_for_a_pair_gets_the_one_that_tells_most_this_once(growing):
+    def says(question):
+        if question.generation == 3 and question.form != "pair":
+            raise AskPair
+        return chooses(question)
+
+    user = Says(says)
+    decided, _ = live(StandIn(user, 1, ask="always"), growing(4))
+    pairs, _ = live(StandIn(Says(chooses), 1, written(decided[:2]), ask="always", shows="pair"), growing(3)[2:])
+    assert [asked.form for asked, _ in decided] == ["best", "best", "pair", "best"]
+    assert as_seen(decided[2:3]) == as_seen(pairs)
+    assert decided[2][1].ranking == best_first(decided[2][0])[:1]
+
+
+def test_what_cannot_be_had_instead_is_an_error_that_says_so(growing, ask):
+    def never(question):
+        raise Skip
+
+    def pair(question):
+        raise AskPair
+
+    question = growing(1)[0]
+    for says, asked in ((never, replace(question, purpose="final")), (pair, replace(question, again=True))):
+        with pytest.raises(AnswerError, match="neither be skipped"):
+            StandIn(Says(says), 1, ask="always").decide(asked)
+    for asked in (question, ask([[1, 2]])):
+        with pytest.raises(AnswerError, match="no other pair"):
+            StandIn(Says(pair), 1, ask="always").decide(asked)
+
+
+def test_a_log_with_a_skipped_question_and_a_pair_is_replayed_as_it_was(growing, tmp_path):
+    lived = StandIn(Says(varied), 3, ask="always")
+    decided, _ = live(lived, growing(9))
+    path = tmp_path / "decisions.jsonl"
+    path.write_text("".join(to_json(record) + "\n" for record in written(decided)))
+    replayed = StandIn(ScriptedUser(path), 3, ask="always")
+    found, _ = live(replayed, growing(9))
+    assert as_seen(found) == as_seen(decided)
+    assert len(replayed.answers) == len(lived.answers)
+
+
+def test_who_was_asked_about_a_pair_before_a_crash_is_not_asked_again(growing):
+    def says(question):
+        if question.form != "pair":
+            raise AskPair
+        return chooses(question)
+
+    *past, last = growing(3)
+    decided, previous = live(StandIn(Says(says), 3, ask="unsure"), [*past, last])
+    before, ahead = decided[:-1], decided[-1:]
+    later = StandIn(Remembered(Says(None), written(ahead)), 3, written(before), "unsure")
+    found, _ = live(later, [last], before[-1][1].policy)
+    assert as_seen(found) == as_seen(ahead)
 
 
 # --- an answer that may be a mistake ------------------------------------------------------------------------------

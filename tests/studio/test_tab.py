@@ -234,6 +234,28 @@ def test_two_policies_may_be_equal(person_config, make_session, tmp_path):
     assert line["equal"] and {each["policy"] for each in line["shown"]} == {policy.id for policy in question.front}
 
 
+def test_a_question_may_be_skipped_or_be_about_a_pair_instead(session, question, tab):
+    assert texts.offers_pair(tab.view)
+    worst = float(np.median(question.values[:, 0]))
+    tab.limit(0, worst)
+    tab.ask_pair()
+    pair = session.question()
+    tab.follow()
+    assert pair.generation == question.generation and pair.form == "pair" and pair.limits[0] == worst
+    assert texts.offers_equal(tab.view) and not texts.offers_pair(tab.view)
+    assert list(tab.selection.letters) == [policy.id for policy in pair.front]
+    tab.choose(pair.front[0].id)
+    assert session.question().generation == question.generation + 1
+    tab.follow()
+    tab.skip()
+    session.question()
+    tab.follow()
+    first, second = (json.loads(line) for line in (session.view.path / "decisions.jsonl").read_text().splitlines())
+    assert {each["policy"] for each in first["shown"]} == {policy.id for policy in pair.front}
+    assert first["limits"][0] == worst and second["stand_in"]
+    assert tab.view.stand_in.startswith("you skipped the question")
+
+
 def test_one_is_told_what_a_stand_in_has_chosen_and_how_many_questions_there_may_be(
     person_config, make_session, tmp_path
 ):

@@ -73,6 +73,11 @@ class QuestionBar:
             ui.button("No difference", on_click=self.tab.say_equal).props("no-caps dense outline")
         if view.question.purpose != "steer":
             return
+        if texts.offers_pair(view):
+            pair = ui.button(texts.COMPARE_TWO, on_click=self.tab.ask_pair).props("no-caps dense outline")
+            pair.tooltip(texts.COMPARE_TWO_HINT)
+        if not view.question.again:
+            ui.button(texts.SKIP, on_click=self.tab.skip).props("no-caps dense outline").tooltip(texts.SKIP_HINT)
         if left > 1:
             ui.label("then go on for")
             number = ui.number(value=self.tab.generations, min=1, max=left, format="%d", on_change=self._go_on_for)
