@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from jmorl.learning.devices import use_all_cpu_cores
     from jmorl.learning.population import TrainingFault
     from jmorl.loop import run
-    from jmorl.methods.base import Method, MethodError, PackedSearch, Problem, Prospect, Tasks
+    from jmorl.methods.base import Method, MethodError, PackedSearch, Problem, Tasks
     from jmorl.methods.registry import register_method
     from jmorl.search.families import Blending, Link
     from jmorl.search.policy import Blend, Policy
@@ -113,7 +113,7 @@ _HOMES = {
     "jmorl.learning.population": "TrainingFault",
     "jmorl.loop": "run",
     "jmorl.methods.registry": "register_method",
-    "jmorl.methods.base": "Method MethodError PackedSearch Problem Prospect Tasks",
+    "jmorl.methods.base": "Method MethodError PackedSearch Problem Tasks",
     "jmorl.search.families": "Blending Link",
     "jmorl.search.policy": "Blend Policy",
     "jmorl.state": "RunState",

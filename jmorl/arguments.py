@@ -192,10 +192,16 @@ def _add_continuing(commands: Any) -> None:
     resume.add_argument("--ask-now", action="store_true", help="the next question is for the user, not for a stand-in")
     _add_output(resume)
 
-    branch = commands.add_parser("branch", help="begin a new run where a run was after one of its generations")
+    branch = commands.add_parser("branch", help="begin a new run where a run was after one of its rounds (generations)")
     branch.add_argument("run", type=to_path, metavar="RUN", help="run folder, which stays as it is")
     branch.add_argument(
-        "--generation", type=_id, required=True, metavar="K", help="the last one taken over; 0: warm-up"
+        "--round",
+        "--generation",
+        dest="generation",
+        type=_id,
+        required=True,
+        metavar="K",
+        help="the last one taken over; 0: warm-up",
     )
     branch.add_argument("--out", type=to_path, required=True, metavar="FOLDER", help="folder of the new run")
     branch.add_argument("--user", help="who decides from then on, as in train (default: the run's own user)")

@@ -170,7 +170,7 @@ def _follow(continued: "Continued", options: argparse.Namespace) -> None:
     _draw(stored)
     if kind in ("live", "lines"):
         megabytes, generations = folder_bytes(path) / 1e6, len(stored.metrics["generation"])
-        size = f"{megabytes:.1f} MB, {megabytes / generations:.1f} for each generation"
+        size = f"{megabytes:.1f} MB, {megabytes / generations:.1f} for each round"
         _tell_of_reference(stored)
         where = f"Everything is in {path} ({size}), the chosen policy in {Layout(path).chosen}."
         console.print(where, soft_wrap=True)

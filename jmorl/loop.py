@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import jax
@@ -267,6 +268,8 @@ class _Run:
     def ask(self, state: RunState, question: AnyQuestion) -> tuple[RunState, Decided]:
         """Put a question to the decision maker. Returns the state with the answer, and the event."""
         started = time.perf_counter()
+        if isinstance(question, Question) and question.purpose == "steer":
+            question = replace(question, prospect=partial(self.method.prospect, state))
         question, answer = self.decision_maker.decide(question)
         answer = question.checked(answer)
         seconds = time.perf_counter() - started

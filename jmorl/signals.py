@@ -35,7 +35,7 @@ class StopSignals:
     as they come: it says what will happen, and at the second ends the process there and then. For the main thread.
     """
 
-    def __init__(self, says: str = "stopping after this generation; once more to stop at once, without it"):
+    def __init__(self, says: str = "stopping after this round; once more to stop at once, without it"):
         self.says = says
         self.received: int | None = None
         self._at_once = False

@@ -65,7 +65,7 @@ def test_a_branch_at_the_end_goes_on_with_more_steps(whole, small_config, tmp_pa
     ("how", "error", "message"),
     [
         ({"generation": 3, "steps": 2000}, CannotContinue, "had used 2112 steps by then; give the branch more"),
-        ({"generation": 9}, CannotContinue, "has no checkpoint of generation 9, only of: 0, 1, 2, 3"),
+        ({"generation": 9}, CannotContinue, "has no checkpoint of round 9, only of: 0, 1, 2, 3"),
         ({"out": "used"}, FolderInUse, "used is not empty, and not a run"),
     ],
 )
@@ -107,7 +107,7 @@ def test_a_checkpoint_of_another_run_is_not_branched_off(whole, small_config, tm
     copy = shutil.copytree(whole, tmp_path / "copy")
     shutil.rmtree(copy / "checkpoints")
     shutil.copytree(other / "checkpoints", copy / "checkpoints")
-    with pytest.raises(CannotContinue, match="00000 belongs to another run; branch off another generation"):
+    with pytest.raises(CannotContinue, match="00000 belongs to another run; branch off another round"):
         branch(copy, 0, tmp_path / "new")
     assert not (tmp_path / "new").exists()
 

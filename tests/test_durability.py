@@ -184,7 +184,7 @@ def test_a_second_signal_ends_the_process_at_once(start, config_file, tmp_path):
     wait_for(folder / "checkpoints" / "00000", process)
     time.sleep(0.5)  # for the generation to begin
     process.send_signal(signal.SIGTERM)
-    assert "stopping after this generation; once more to stop at once" in process.stderr.readline()
+    assert "stopping after this round; once more to stop at once" in process.stderr.readline()
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=60)
     assert process.returncode == 143

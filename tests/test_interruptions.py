@@ -46,7 +46,7 @@ def test_a_signal_ends_a_run_after_its_generation_and_says_how_to_go_on(
         assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 128 + number
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == handlers
     errors = capsys.readouterr().err
-    assert "stopping after this generation" in errors
+    assert "stopping after this round" in errors
     assert f"{number.name} received" in errors and f"go on with: jmorl resume {path}" in errors
     assert len((path / "metrics.csv").read_text().splitlines()) == 1 + 3
     assert main(["train", "--config", str(config), "--out", str(path)]) == 2
@@ -103,7 +103,7 @@ def test_a_full_disk_ends_the_run_with_what_it_had_and_it_can_go_on(whole, small
         patch.setattr(checkpoints, "write_arrays", full)
         assert main(["train", "--config", str(config), "--out", str(path), "--quiet"]) == 1
     errors = capsys.readouterr().err
-    assert "of generation 2 could not be written" in errors and "No space left" in errors and "go on with" in errors
+    assert "of round 2 could not be written" in errors and "No space left" in errors and "go on with" in errors
     assert main(["resume", str(path), "--quiet"]) == 0
     shutil.rmtree(path / "plots")
     assert outcome(path) == outcome(whole)

@@ -87,7 +87,7 @@ def test_the_checkpoint_before_a_damaged_one_is_used_and_both_are_named(whole, c
     _, notes = go_on(copy)
     assert len(notes) == 3
     assert "00003/policies.csv is damaged" in notes[0] and "00002/policies.csv is damaged" in notes[1]
-    assert notes[2] == "the run goes on from generation 1 instead"
+    assert notes[2] == "the run goes on from round 1 instead"
     assert outcome(copy) == outcome(whole)
 
 

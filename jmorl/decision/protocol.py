@@ -4,8 +4,8 @@ The run imports this; users implement it; neither knows the other.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from envs.core import Objective
 from jmorl.decision.answers import Answer, AnswerError, Choose, PointAnswer, shortly, whole_number
 from jmorl.decision.enautilus import IntermediatePoint, State
 from jmorl.search.policy import Policy, values_of
+from jmorl.search.prospect import Prospect
 
 Purpose = Literal["steer", "final", "enautilus", "pair"]
 Form = Literal["best", "pair", "rank"]
@@ -92,6 +93,8 @@ class Question(AnyQuestion):
     limits: tuple[float, ...] | None = None  # [M] that somebody has set, -inf where there is none; None: never any
     previous_by_stand_in: bool = False  # the policy chosen last was a stand-in's choice
     again: bool = False  # the second question about one choice, see `DecisionMaker.follow_up`
+    # In a run: what choosing a policy would mean; None where it would change nothing.
+    prospect: Callable[[Policy], Prospect | None] = field(default=lambda policy: None, compare=False, repr=False)
 
     @property
     def shown(self) -> tuple[Policy, ...]:

@@ -2,33 +2,33 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from envs.core import Objective
 from jmorl.decision.answers import Adjust, Answer, AskPair, Back, Choose, Instead, PointAnswer, Skip
 from jmorl.decision.protocol import DecisionMaker, PointQuestion, Question
-from jmorl.decision.terminal_view import show_front, show_points
+from jmorl.decision.terminal_view import show_front, show_outlook, show_points
 from jmorl.display.console import PlainConsole
 from jmorl.display.readings import direction
 
 LONGEST_NUMBER = 9  # digits
 POLICY_HELP = """\
-A policy is one way to act that was trained. Its scores are means over episodes, ± their spread from episode to episode.
-{directions}. Training goes on around your choice: it looks for nothing that is much worse. Where your
-answers leave no doubt, a stand-in chooses for you and says so. To choose otherwise later:
-jmorl branch RUN --generation K --out NEW.
+A policy is one way to act that was trained. Its scores are means over episodes,
+± their spread from episode to episode. {directions}.
+To choose otherwise later: jmorl branch RUN --round K --out NEW.
   12           choose policy 12
+  if 12        say what choosing policy 12 would mean
   Enter        keep the last choice: none of these is better
   12 4 9       prefer policy 12, then 4, then 9, to all others
   same         no difference between these
-  pair         ask me about two of them instead: the two whose comparison tells most
+  pair         ask about two policies instead, whose comparison tells most
   skip         I cannot say: go on by my earlier answers
   {limit}
                rule out what does not reach this; none takes it back
   {best:<12} list the policies that are best in an objective first
-  all          list every policy, where only some are shown; the others can be chosen, too
+  all          list every policy, where only some are shown
   12 go 5      choose policy 12, then no question for 5 rounds (or go 5)
   12 q         choose policy 12 and end (q or Ctrl-D: with the last choice)
   ?            this help"""
@@ -39,6 +39,13 @@ POINT_HELP = """\
   points 5     show up to 5 points in each
   q            end here, or with Ctrl-D, with the policy nearest to where you are
   ?            this help"""
+
+
+@dataclass(frozen=True)
+class If:
+    """The wish to know what choosing a policy would mean."""
+
+    policy: int
 
 
 class TerminalUser(DecisionMaker):
@@ -71,6 +78,8 @@ class TerminalUser(DecisionMaker):
                     return replace(reply, limits=None if question.limits == limits else question.limits)
                 case Answer():
                     return replace(reply, limits=None if question.limits == limits else question.limits)
+                case If():
+                    show_outlook(self.console, question, reply.policy)
                 case Instead():
                     reply.limits = None if question.limits == limits else question.limits
                     raise reply
@@ -118,7 +127,7 @@ def _prompt(question: Question) -> str:
     return "policy (? for help) > "
 
 
-def policy_reply(question: Question, line: str) -> Answer | Instead | int | tuple[float, ...] | str:
+def policy_reply(question: Question, line: str) -> Answer | Instead | If | int | tuple[float, ...] | str:
     """Return what a line means: an answer, what is wanted instead, an objective to list by, limits, or what to say.
 
     An objective is its index. What is said is a sentence, after which the question is asked again. Limits [M] are those
@@ -138,6 +147,8 @@ def policy_reply(question: Question, line: str) -> Answer | Instead | int | tupl
     if words == ["same"]:
         kept = question.previous in [policy.id for policy in question.whole.front]
         return Answer(question.previous if kept and question.previous is not None else question.front[0].id, equal=True)
+    if words[:1] == ["if"]:
+        return _if(question, words[1:])
     if words in (["skip"], ["pair"]):
         return _instead(question, words[0])
     ranking = _ranking(question, words)
@@ -189,6 +200,16 @@ def point_reply(question: PointQuestion, line: str) -> PointAnswer | str:
         case [word] if (chosen := _number(word)) and chosen <= shown:
             return Choose(chosen - 1)
     return f"Choose a point by its number, 1 to {shown}; ? lists what else you can type."
+
+
+def _if(question: Question, words: list[str]) -> If | str:
+    """Return the policy whose choice is asked about, or why nothing can be said of it."""
+    if question.purpose != "steer":
+        return "The policy that you choose is the result; nothing follows."
+    if len(words) != 1:
+        return f"Say which policy, for example: if {question.front[0].id}"
+    chosen = _policy(question, words[0])
+    return chosen if isinstance(chosen, str) else If(chosen)
 
 
 def _instead(question: Question, word: str) -> Instead | str:

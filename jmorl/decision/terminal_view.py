@@ -8,16 +8,23 @@ from envs.core import Objective
 from jmorl.decision.protocol import PointQuestion, Question
 from jmorl.display.console import PlainConsole
 from jmorl.display.fronts import front_scatter, front_table
+from jmorl.display.questions import front_question, introduction, outlook
 from jmorl.display.readings import Writer, bounds_in_words, reading_label, writers_for
 from jmorl.display.tables import PlainTable
-from jmorl.display.text import front_question, plural
+from jmorl.display.text import minus, plural
 from jmorl.search.bounds import within
 
 PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
 
 def show_front(console: PlainConsole, question: Question, by: int) -> None:
-    """Show the question, its front with the best in objective `by` first, and a plot of it."""
+    """Show the question, its front with the best in objective `by` first, and a plot of it.
+
+    Before the first question of a run it says what happens.
+    """
+    if question.generation == 1 and question.purpose == "steer" and not question.again:
+        console.print()
+        console.print(introduction(question.objectives))
     heading = front_question(question.purpose, question.generation, len(question.front), question.form, question.again)
     table = front_table(
         question.front,
@@ -43,6 +50,14 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
     by_whom = "chosen for you" if question.previous_by_stand_in else "your last choice"
     marks, legend = ({"x": chosen[0]}, f"o: a policy, x: {by_whom}") if chosen else ({}, "o: a policy")
     show_plot(console, question.objectives, question.values, marks, legend)
+
+
+def show_outlook(console: PlainConsole, question: Question, policy_id: int) -> None:
+    """Say what choosing a policy would mean for the search."""
+    prospect, values = question.prospect(question.policy(policy_id)), question.whole.values
+    writers = writers_for(values, question.objectives)
+    area = minus(bounds_in_words(prospect.bounds, writers)) if prospect else ""
+    console.print(outlook(f"policy {policy_id}", area, prospect, values, writers))
 
 
 def limits_in_words(question: Question) -> str:

@@ -14,7 +14,7 @@ A user with weights may have options, behind a comma:
 
 random=0.2                       one answer in five is any of the policies shown
 temperature=0.05                 errs between policies whose utilities differ by little, in shares of their range
-before=0.2,0.8,until=6           had other weights before generation 6
+before=0.2,0.8,until=6           had other weights before round 6
 limits=none,-45                  rules out what has less; none: anything will do
 """
 

@@ -34,7 +34,7 @@ def front_table(
     """One row for each of at least one policy, the best in objective `by` first.
 
     Scores are as people say them, with their standard deviation over the evaluation episodes; weights are those the
-    policy was trained with, and gen the generation it was born in, 0 being the warm-up. What lies outside the
+    policy was trained with, and round the generation it was born in, 0 being the warm-up. What lies outside the
     bounds [M], or does not reach the limits [M] that somebody has set, is dimmed. `noted` is what somebody has noted
     about policies, by id.
     """
@@ -44,7 +44,7 @@ def front_table(
     good = np.ones(len(policies), bool) if limits is None else within(values, np.array(limits))
     columns = zip(writers_for(values, objectives), values.T, stds.T, strict=True)
     scores = [_scores(*column) for column in columns]
-    table = PlainTable("policy", *map(stacked_label, objectives), "weights", "gen", "")
+    table = PlainTable("policy", *map(stacked_label, objectives), "weights", "round", "")
     for index in np.argsort(-values[:, by], kind="stable"):
         policy = policies[index]
         role = {policy.id == previous_id: previous_name, policy.id == chosen_id: "chosen"}.get(True)

@@ -1,4 +1,4 @@
-"""Numbers, counts and questions as people read them."""
+"""Numbers and counts as people read them."""
 
 import math
 import re
@@ -66,23 +66,6 @@ def plural(count: int, noun: str) -> str:
     if count == 1:
         return f"1 {noun}"
     return f"{count} {noun[:-1]}ies" if noun.endswith("y") else f"{count} {noun}s"
-
-
-def front_question(purpose: str, generation: int, policies: int, form: str = "best", again: bool = False) -> str:
-    """Return the question about a front of so many policies; the other parameters are a Question's."""
-    when = "The run is over." if purpose == "final" else f"Round {generation}."
-    if again:
-        return f"{when} Your earlier answers speak for the other one of these two. Which one do you prefer?"
-    if form == "pair":
-        return f"{when} Which one of these two policies do you prefer?"
-    if form == "rank":
-        return f"{when} In which order do you prefer these {policies} policies?"
-    if purpose == "final":
-        return f"{when} " + (
-            f"Which of these {policies} policies is its result?" if policies > 1 else "Is this policy its result?"
-        )
-    which = f"which of these {policies} policies do you prefer?" if policies > 1 else "do you go on with this policy?"
-    return f"Round {generation}: {which}"
 
 
 def objective_label(objective: Objective) -> str:

@@ -18,6 +18,7 @@ from envs.core import Objective
 from jmorl.decision.protocol import AnyQuestion
 from jmorl.search.metrics import Utility
 from jmorl.search.policy import Policy
+from jmorl.search.prospect import Prospect
 from jmorl.search.settings import SearchConfig
 from jmorl.state import RunState
 
@@ -49,16 +50,6 @@ class Tasks:
     candidates: int  # policies that could have been continued
     interval: np.ndarray | None = None  # [2, P, M] ends between which the values lie in 80 of 100 cases
     spread: np.ndarray | None = None  # [P, M] standard deviation about the expected values
-
-
-@dataclass(frozen=True, eq=False)
-class Prospect:
-    """What choosing a policy would mean for the generation that follows."""
-
-    bounds: np.ndarray  # [M] that would be in force
-    kept: np.ndarray  # [N] bool, members of the archive that reach them; the others would be ruled out
-    expected: np.ndarray  # [K, M] best of what the prediction model expects within them; K may be zero
-    odds: float  # how often training leads at least as far as expected in every objective, from 0 to 1
 
 
 @dataclass(frozen=True, eq=False)

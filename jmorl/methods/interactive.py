@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from jmorl.decision.protocol import AnyQuestion, Question
-from jmorl.methods.base import Prospect, Tasks
+from jmorl.methods.base import Tasks
 from jmorl.methods.pgmorl import PGMORL, PGMORLState
 from jmorl.search.bounds import members_within, widened_bounds, within
 from jmorl.search.metrics import Utility
 from jmorl.search.pareto import non_dominated
 from jmorl.search.policy import Policy, values_of
+from jmorl.search.prospect import Prospect
 from jmorl.search.scaling import range_scale
 from jmorl.search.scouts import Scouts, supporting_weights
 from jmorl.state import RunState

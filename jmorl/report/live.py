@@ -168,11 +168,11 @@ class LiveView(Watcher):
 def _phase(timeline: Timeline) -> str:
     match timeline.phase:
         case "generation":
-            return f"generation {timeline.generation} of {timeline.generations}"
+            return f"round {timeline.generation} of {timeline.generations}"
         case "question" if timeline.generation > timeline.generations:
             return "final choice"
         case "question":
-            return f"choice for generation {timeline.generation}"
+            return f"choice for round {timeline.generation}"
     return timeline.phase
 
 

@@ -116,7 +116,7 @@ def decisions_table(run: StoredRun) -> PlainTable:
     """One row for each answer, with the policy it prefers."""
     writers = writers_for(values_of(run.front), run.objectives)
     headings = map(stacked_label, run.objectives)
-    table = PlainTable("gen", "question", "among", "policy", *headings, "", title="Decisions")
+    table = PlainTable("round", "question", "among", "policy", *headings, "", title="Decisions")
     for record in run.decisions:
         if isinstance(record, DecisionRecord):
             cells = [writer.value(value) for writer, value in zip(writers, record.values, strict=True)]
@@ -134,7 +134,7 @@ def _kind_of_answer(record: DecisionRecord, writers: Sequence[Writer]) -> str:
         "by the stand-in": record.stand_in,
         "no difference": record.equal,
         f"in the order {' '.join(map(str, record.ranking))}": record.ranking,
-        f"go on for {plural(record.generations, 'generation')}": record.generations > 1,
+        f"go on for {plural(record.generations, 'round')}": record.generations > 1,
         f"limits: {(bounds_in_words(limits, writers) if limits else '') or 'none'}": record.limits,
         "stop": record.stop,
     }

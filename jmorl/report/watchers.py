@@ -121,7 +121,7 @@ class Lines(Watcher):
         return f"blending: {', '.join(facts)} (evaluate {duration(event.seconds.total)})"
 
     def _name(self, generation: int) -> str:
-        return f"generation {generation} of {self.generations}" if generation else "warm-up"
+        return f"round {generation} of {self.generations}" if generation else "warm-up"
 
 
 class Json(Watcher):
@@ -221,7 +221,7 @@ def blending_fields(blending: Blending) -> dict[str, Any]:
 def question_name(decided: Decided) -> str:
     """Name the question, and who answered it if nobody was asked."""
     question = decided.question
-    name = "final choice" if question.purpose == "final" else f"choice for generation {question.generation}"
+    name = "final choice" if question.purpose == "final" else f"choice for round {question.generation}"
     return name if question.was_asked(decided.answer) else f"the stand-in's {name}"
 
 
@@ -240,7 +240,7 @@ def choice_in_words(decided: Decided, objectives: Sequence[Objective]) -> str:
         return choice
     bounds = bounds_in_words(decided.bounds, writers) or "none"
     silent = decided.generations_to_question or 0
-    more = f", no question for {plural(silent, 'generation')}" if silent > 1 else ""
+    more = f", no question for {plural(silent, 'round')}" if silent > 1 else ""
     return f"{choice}; bounds {bounds}{more}"
 
 

@@ -109,7 +109,7 @@ class CheckpointWriter:
                 remove(checkpoint_path(self.folder, generation))
         except Exception as error:
             reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-            problem = f"the checkpoint of generation {state.generation} could not be written: {reason}"
+            problem = f"the checkpoint of round {state.generation} could not be written: {reason}"
             raise CheckpointError(problem) from error
 
 
@@ -157,7 +157,7 @@ def read_checkpoint(folder: Path, generation: int) -> Checkpoint:
     layout = CheckpointLayout(checkpoint_path(folder, generation))
     document = _read_document(layout.document)
     if document["generation"] != generation:
-        raise DamagedCheckpoint(f"{layout.root} is the checkpoint of generation {document['generation']}")
+        raise DamagedCheckpoint(f"{layout.root} is the checkpoint of round {document['generation']}")
     for name, fingerprint in document["files"].items():
         _check(layout.root / name, fingerprint)
     try:

@@ -237,7 +237,7 @@ def _its_user(path: Path, config: Config, environment: Environment[Any]) -> Deci
             return make_user(f"script={log}", environment.objectives)
         raise CannotContinue(
             f"the run in {path} is decided by {config.user}, but {error}; put that right, or let another user decide "
-            f"in a branch: {command('branch', path)} --generation K --out NEW --user USER"
+            f"in a branch: {command('branch', path)} --round K --out NEW --user USER"
         ) from error
 
 
@@ -295,7 +295,7 @@ def _restore(folder: RunFolder, found: Found | None, notes: list[str]) -> RunSta
     layout = folder.layout
     later = [each for each in stored_generations(layout.checkpoints) if not state or each > state.generation]
     if later:
-        notes.append(f"the run goes on from {f'generation {state.generation}' if state else 'the beginning'} instead")
+        notes.append(f"the run goes on from {f'round {state.generation}' if state else 'the beginning'} instead")
     _restore_logs(folder, checkpoint)
     if folder.decisions.restored:
         notes.append(f"{folder.decisions.path} was not as the checkpoint knows it, and is restored from there")

@@ -74,13 +74,13 @@ def state_after(
     stored = stored_generations(Layout(path).checkpoints)
     if generation not in stored:
         raise CannotContinue(
-            f"{path} has no checkpoint of generation {generation}, only of: {', '.join(map(str, stored)) or 'none'}"
+            f"{path} has no checkpoint of round {generation}, only of: {', '.join(map(str, stored)) or 'none'}"
         )
     try:
         checkpoint = _own_checkpoint(path, generation, manifest)
         return checkpoint, _unpacked(path, checkpoint, config, environment)
     except DamagedCheckpoint as error:
-        raise CannotContinue(f"{error}; branch off another generation") from error
+        raise CannotContinue(f"{error}; branch off another round") from error
 
 
 def _own_checkpoint(path: Path, generation: int, manifest: Manifest) -> Checkpoint:

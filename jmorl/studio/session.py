@@ -21,12 +21,10 @@ from jmorl.decision.answers import Answer, AnswerError, Instead, PointAnswer
 from jmorl.decision.protocol import Question
 from jmorl.events import RunFinished
 from jmorl.learning.population import TrainingFault
-from jmorl.loop import make_method
 from jmorl.methods.base import MethodError, Prospect
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy, rescored
-from jmorl.state import RunState
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
 from jmorl.storage.notes_file import change_note, read_notes
@@ -166,10 +164,10 @@ class Session:
 
     def work_out(self, policy: int) -> None:
         """Find out in the background what choosing the policy would mean; `prospects` has it then."""
-        question, state = self.view.question, self.view.state
-        if question and question.purpose != "final" and state and (id(question), policy) not in self._worked_out:
+        question = self.view.question
+        if question and (id(question), policy) not in self._worked_out:
             self._worked_out.add((id(question), policy))
-            self._background.submit(self._note_prospect, question, state, policy)
+            self._background.submit(self._note_prospect, question, policy)
 
     def history(self) -> tuple[Branch, ...]:
         """Read the run that is open, and its branches; nothing if none is open."""
@@ -371,15 +369,14 @@ class Session:
         """Show agents in the middle of the warm-up."""
         self._change(front=agents)
 
-    def _note_prospect(self, question: Question, state: RunState, policy: int) -> None:
+    def _note_prospect(self, question: Question, policy: int) -> None:
         if self.view.question is not question:  # it is answered: the processors train
             return
         try:
             chosen = question.policy(policy)
         except ValueError:  # a policy that is looked at, but not to choose from
             return
-        config = self.view.config
-        found = make_method(config, envs.make(config.env)).prospect(state, chosen)
+        found = question.prospect(chosen)
         if found and self.view.question is question:
             self.prospects = {**self.prospects, policy: found}
 

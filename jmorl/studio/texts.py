@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 
 import envs
 from envs.core import Objective
+from jmorl.display import questions
 from jmorl.display.commands import command
 from jmorl.display.readings import Writer, values_in_words, writers_for
-from jmorl.display.text import duration, front_question, minus, number, plural, short_count
+from jmorl.display.text import duration, minus, number, plural, short_count
 from jmorl.report.timeline import Timeline
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
@@ -32,11 +32,6 @@ LIMITS_HINT = (
 )
 WARM_UP = "The first policies learn the basics. You soon see how they do."
 EARLY = "The first policies, still learning. You are asked when the warm-up is over."
-INTRODUCTION = (
-    "Policies are trained that trade {objectives} against each other. After a round of training you say which one you "
-    "like best; the next round searches around it. What your answers leave no doubt about is chosen for you. Nothing is"
-    " final: you can go back to any earlier question."
-)
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
 SKIP, SKIP_HINT = (
     "Skip",
@@ -80,7 +75,6 @@ COMPARE_HINT = "Stars are results. Policies that branches share lie over each ot
 NOTHING_TO_COMPARE = "There is nothing to compare yet: two branches with a front are needed."
 SHORT = 18  # characters of a name, in the line of the question
 SURELY = 3  # standard errors that a score must lie behind another to be called worse
-MOST_POINTS, LONGEST_POINTS = 3, 150  # that the prediction model is quoted with, and their characters
 KEYS = (
     ("← →", "look at the next policy along the front"),
     ("↑ ↓", "in the table: look at the next row"),
@@ -188,7 +182,7 @@ def heading(view: View, selection: Selection) -> str:
         return f"{plural(len(more), 'policy')} better in {label} than {policy_name(view, selection.than, SHORT)}"
     if question:
         purpose, generation, form, again = question.purpose, question.generation, question.form, question.again
-        asked = front_question(purpose, generation, len(question.front), form, again)
+        asked = questions.front_question(purpose, generation, len(question.front), form, again)
         if view.timeline is not None and view.timeline.left == 1 and purpose == "steer":
             asked = f"{asked} {LAST_ROUND}"
         return asked if reaching(view, selection).any() else f"{asked} {NONE_REACHES}"
@@ -240,19 +234,9 @@ def remarks(view: View, policy: Policy) -> str:
     return ", ".join(filter(None, (view.noted.policy(policy.id).name, replaced)))
 
 
-def introduction(view: View) -> str:
-    """Say to somebody new what happens here."""
-    return INTRODUCTION.format(objectives=_joined([objective.label for objective in view.objectives]))
-
-
 def objectives(labels: Sequence[str]) -> str:
     """Say what an environment has for objectives."""
-    return f"Its objectives are {_joined(labels)}."
-
-
-def _joined(labels: Sequence[str]) -> str:
-    *others, last = labels
-    return f"{', '.join(others)} and {last}"
+    return f"Its objectives are {questions.joined(labels)}."
 
 
 def ranges(view: View) -> list[str]:
@@ -396,22 +380,10 @@ def outlook(view: View, selection: Selection) -> str:
     focus, question = selection.focus, view.question
     if focus is None or question is None or question.purpose != "steer" or not view.choosable(focus):
         return ""
-    letter = f"If you choose {selection.letters[focus]}:"
-    prospect = selection.prospect
-    if prospect is None:
-        return f"{letter} …"
-    kept = int(prospect.kept.sum())
-    narrows = f"{letter} the search narrows to the dashed area, with {kept} of {plural(len(prospect.kept), 'policy')}."
-    if kept == len(prospect.kept):
-        narrows = f"{letter} the search goes on around all {plural(kept, 'policy')}."
-    expected = prospect.expected[[not within(view.values, point).any() for point in prospect.expected]]
-    if not len(expected):
-        return f"{narrows} Nothing better than what is there is expected."
-    best = dict.fromkeys(expected.argmax(axis=0).tolist())  # in an objective, each a point of its own
-    points = [minus(values_in_words(expected[row], writers_of(view))) for row in best]
-    count = max(1, sum(length <= LONGEST_POINTS for length in accumulate(len(point) for point in points[:MOST_POINTS])))
-    odds = f"{10 * prospect.odds:.0f} of 10 such forecasts come true."
-    return f"{narrows} It may find {'; or '.join(points[:count])}. {odds}"
+    letter = selection.letters[focus]
+    if selection.prospect is None:
+        return f"If you choose {letter}: …"
+    return questions.outlook(letter, "the dashed area", selection.prospect, view.values, writers_of(view))
 
 
 def _certainty(view: View, policy: Policy) -> str:

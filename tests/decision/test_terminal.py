@@ -9,11 +9,12 @@ import pytest
 
 from envs.core import Objective
 from jmorl.decision import enautilus as en
-from jmorl.decision.answers import Adjust, Answer, Back, Choose
+from jmorl.decision.answers import Adjust, Answer, AskPair, Back, Choose, Skip
 from jmorl.decision.navigation import run_enautilus
 from jmorl.decision.protocol import PointQuestion
 from jmorl.decision.terminal import TerminalUser, policy_reply
 from jmorl.display.console import PlainConsole
+from jmorl.search.prospect import Prospect
 
 # Policies 10, 11, 12 in the tests below.
 VALUES = [[-70, -40], [-66.25, -57], [-100, -20]]
@@ -121,6 +122,10 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
         ("best speed", "Best in what?"),
         ("best 0", "Best in what?"),
         ("best 3", "Best in what?"),
+        ("if", "Say which policy, for example: if 10"),
+        ("if 99", "There is no policy 99"),
+        ("if 10 12", "Say which policy"),
+        ("pair pair", "I do not understand 'pair'"),
     ],
 )
 def test_mistakes_are_explained_and_asked_again(ask, line, sentence):
@@ -145,6 +150,59 @@ def test_without_a_last_choice_in_the_front_one_must_choose(ask, line, previous,
 def test_the_input_ending_before_any_choice_is_an_error_not_a_loop(ask):
     with pytest.raises(EOFError, match="before a policy was chosen; continue the run to be asked again"):
         Session("what?").user.answer(ask(VALUES))
+
+
+@pytest.mark.parametrize(("line", "instead"), [("skip", Skip), ("PAIR", AskPair)])
+def test_a_question_is_skipped_or_asked_about_a_pair_with_the_limits_so_far(ask, line, instead):
+    with pytest.raises(instead) as raised:
+        Session("limit fuel -45", line).user.answer(ask(VALUES, previous=11))
+    assert raised.value.limits == (-np.inf, -45.0)
+    with pytest.raises(instead) as raised:
+        Session(line).user.answer(ask(VALUES, previous=11))
+    assert raised.value.limits is None
+
+
+@pytest.mark.parametrize(
+    ("line", "changes", "sentence"),
+    [
+        ("skip", {"purpose": "final"}, "This question has to be answered"),
+        ("if 12", {"purpose": "final"}, "The policy that you choose is the result; nothing follows."),
+        ("pair", {"again": True}, "With same, what you have just chosen stays."),
+        ("pair", {"form": "pair"}, "This question is about two policies already."),
+        ("pair", {"front": 2}, "There are no more than two policies."),
+    ],
+)
+def test_what_a_question_does_not_have_is_said(ask, line, changes, sentence):
+    question = ask(VALUES[: changes.pop("front", 3)], previous=11)
+    session = Session(line, "11")
+    assert session.user.answer(replace(question, **changes)).policy == 11
+    assert sentence in session.sentences
+
+
+def test_what_a_choice_would_mean(ask):
+    expected = np.array([[-55.0, -52.0], [-90.0, -60.0]])  # the second is worse than what is there
+
+    def prospect(policy):
+        kept = np.array([policy.id == 12, True, True])
+        return Prospect(np.array([-65.0, -np.inf]), kept, expected, odds=0.42)
+
+    session = Session("if 11", "if 12", "12")
+    session.user.answer(replace(ask(VALUES), prospect=prospect))
+    said = " ".join(session.output.split())
+    assert "If you choose policy 11: the search narrows to time label ≥ −65.0, with 2 of 3 policies." in said
+    assert "If you choose policy 12: the search goes on around all 3 policies." in said
+    assert "It may find time label −55.0, fuel label −52.0. 4 of 10 such forecasts come true." in said
+    session = Session("if 12", "12")
+    session.user.answer(ask(VALUES))  # a choice that changes nothing
+    assert "If you choose policy 12, the search goes on as before." in session.output
+
+
+def test_before_the_first_question_one_is_told_what_happens(ask):
+    told = "Policies are trained that trade time label and fuel label against each other."
+    for generation, said in ((1, True), (2, False)):
+        session = Session("12")
+        session.user.answer(ask(VALUES, generation=generation))
+        assert (told in " ".join(session.output.split())) == said
 
 
 def test_numbers_may_be_written_as_people_write_them(ask):

@@ -40,7 +40,7 @@ def test_a_row_says_all_about_a_policy():
     table = front_table(policies(VALUES), OBJECTIVES, chosen_id=12, previous_id=11)
     head, units, _, best, _, last = rows(table)
     assert head == ["time", "fuel"]
-    assert units == ["policy", "(-steps)", "(-litres)", "weights", "gen"]
+    assert units == ["policy", "(-steps)", "(-litres)", "weights", "round"]
     assert best == ["11", "-66.2", "±0.5", "-57.0", "±0.5", "0.3", "0.7", "1", "last", "choice"]
     assert last == ["12", "-100.0", "±0.5", "-20.0", "±0.5", "0.3", "0.7", "2", "chosen"]
 

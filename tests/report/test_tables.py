@@ -117,7 +117,7 @@ def test_a_row_for_every_decision(make_run):
     ("changes", "note"),
     [
         ({"stop": True}, "stop"),
-        ({"generations": 3}, "go on for 3 generations"),
+        ({"generations": 3}, "go on for 3 rounds"),
         ({"equal": True}, "no difference"),
         ({"ranking": (2, 1)}, "in the order 2 1"),
         ({"limits": (None, -45.0)}, "limits: fuel ≥ -45.0"),

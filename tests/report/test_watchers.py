@@ -31,7 +31,7 @@ def test_there_is_a_line_for_every_event_and_the_result_as_a_table(make_events):
     assert lines[0].endswith("; training 2.64 M steps at about 40.0 k steps/s takes 1 min 6 s")
     starts = ["compiled in 3.2 s on 2 devices", "warm-up: 240 k steps, 23.5 k steps/s, front of 4,"]
     for generation in range(1, 11):
-        starts += [f"choice for generation {generation}: policy ", f"generation {generation} of 10: "]
+        starts += [f"choice for round {generation}: policy ", f"round {generation} of 10: "]
     starts += [
         "final choice: policy 58 ",
         "finished: the budget of environment steps is used up; the result is policy 58",
@@ -50,8 +50,8 @@ def test_a_resumed_run_says_where_it_goes_on(make_events, capsys):
         Resumed(finished.state, finished.steps, finished.bounds, 0) for finished in (events[1], events[5])
     )
     assert shown("lines", [warm_up]) == "resumed after warm-up, with a front of 4\n"
-    assert shown("lines", [later]).startswith("resumed after generation 2 of 10, with a front of ")
-    assert "choice for generation 3" in shown("live", [events[0], later])
+    assert shown("lines", [later]).startswith("resumed after round 2 of 10, with a front of ")
+    assert "choice for round 3" in shown("live", [events[0], later])
     shown("json", [later])
     assert json.loads(capsys.readouterr().out) == {"event": "resumed", "generation": 2, "steps": later.steps}
 
@@ -62,13 +62,13 @@ def test_a_choice_is_said_with_values_and_bounds(make_events):
     time, fuel = decided.bounds
     words = "policy 2 (time -201, fuel -91.29) of 4 shown"
     bounds = f"bounds time ≥ {time:.0f}, fuel ≥ {fuel:.2f}"
-    assert f"choice for generation 1: {words}; {bounds}\n" in shown("lines", [decided])
+    assert f"choice for round 1: {words}; {bounds}\n" in shown("lines", [decided])
     ranked = replace(decided, answer=replace(decided.answer, ranking=(2, 3, 0)))
     assert f"{words}, in the order 2, 3, 0; {bounds}\n" in shown("lines", [ranked])
     same = replace(decided, answer=replace(decided.answer, equal=True))
     assert f"{words}, no difference between them; {bounds}\n" in shown("lines", [same])
     for_long = replace(decided, generations_to_question=3)
-    assert f"{words}; {bounds}, no question for 3 generations\n" in shown("lines", [for_long])
+    assert f"{words}; {bounds}, no question for 3 rounds\n" in shown("lines", [for_long])
     enough = replace(decided, answer=replace(decided.answer, stop=True))
     assert f"{words}, and stop\n" in shown("lines", [enough])
 
@@ -136,7 +136,7 @@ def test_a_live_view_tells_where_the_run_stands(make_events):
     text = file.getvalue()
     # A generation took 10.1 seconds; the second of ten is going on.
     for fact in (
-        "generation 2 of 10",
+        "round 2 of 10",
         "542 k of 2.64 M steps",
         "next question  in 7.5 s",
         "end            in about 1 min 28 s",
@@ -197,11 +197,11 @@ def test_a_live_view_leaves_the_screen_to_a_question_at_this_terminal_and_comes_
         assert screen.frames.acquire(timeout=20)
     after = screen.getvalue().partition("which of these?\n")[2]
     first_frame, *_ = after.partition("\x1b[1A")
-    assert "generation 1 of 10" in first_frame and "next question" in first_frame
+    assert "round 1 of 10" in first_frame and "next question" in first_frame
 
 
 def test_a_live_view_stays_while_an_artificial_user_is_asked(make_events):
-    screen = Screen("choice for generation 1")
+    screen = Screen("choice for round 1")
     with screen.watched(user="A") as watching:
         for event in make_events()[:2]:
             watching.show(event)
@@ -218,5 +218,5 @@ def test_a_live_view_says_how_far_the_run_is_on_every_screen(make_events, width)
         view.timeline = view.timeline.after(event, 0.0)
     console.print(view.panel())
     text = file.getvalue()
-    assert "generation 2 of 10" in text and "480 k of 2.64 M steps" in text
+    assert "round 2 of 10" in text and "480 k of 2.64 M steps" in text
     assert max(map(len, text.splitlines())) <= width

@@ -136,7 +136,7 @@ def test_a_failure_in_the_background_is_raised_by_the_next_call(make_state, meth
         with monkeypatch.context() as patch:
             patch.setattr(checkpoints, "write_arrays", full)
             writer.save(make_state(2), LOGS)
-            with pytest.raises(CheckpointError, match="of generation 2 could not be written: .*No space left"):
+            with pytest.raises(CheckpointError, match="of round 2 could not be written: .*No space left"):
                 call(writer)
         writer.close()
 

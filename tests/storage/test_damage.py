@@ -155,7 +155,7 @@ def test_a_checkpoint_with_a_valid_digest_and_odd_content_is_passed_over_and_nam
     code, errors = said_by("branch", run, capsys)
     assert code == 2 and str(place.root) in errors and errors.count("\n") == 1
     code, errors = said_by("resume", run, capsys)
-    assert code == 0 and str(place.root) in errors and "goes on from generation 2 instead" in errors
+    assert code == 0 and str(place.root) in errors and "goes on from round 2 instead" in errors
 
 
 # What Orbax was about to do when it failed may come to its end later, without its event loop.
@@ -164,7 +164,7 @@ def test_a_checkpoint_that_orbax_cannot_read_is_passed_over_and_named(run, capsy
     place = changed_checkpoint(run, lambda document: document["files"].clear())
     place.arrays.joinpath("manifest.ocdbt").unlink()
     code, errors = said_by("resume", run, capsys)
-    assert code == 0 and f"{place.root} is damaged: " in errors and "goes on from generation 2 instead" in errors
+    assert code == 0 and f"{place.root} is damaged: " in errors and "goes on from round 2 instead" in errors
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_what_is_no_checkpoint_at_all_is_passed_over(run, capsys, what):
     place.touch() if what == "a file" else place.mkdir()
     assert said_by("branch", run, capsys)[0] == 2
     code, errors = said_by("resume", run, capsys)
-    assert code == 0 and "goes on from generation 2 instead" in errors
+    assert code == 0 and "goes on from round 2 instead" in errors
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ import pytest
 from envs.core import Objective, Reading
 from jmorl.config import resolve
 from jmorl.decision.protocol import Question
-from jmorl.methods.base import Prospect
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Confirmation, Policy
+from jmorl.search.prospect import Prospect
 from jmorl.storage.notes_file import Note, Notes
 from jmorl.studio import dialogue, texts
 from jmorl.studio.charts.curves import curve_options
