@@ -39,6 +39,7 @@ class StopSignals:
         self.says = says
         self.received: int | None = None
         self._at_once = False
+        self._raised = False
 
     def __enter__(self) -> Self:
         self._read_end, self._write_end = socket.socketpair()  # a pipe would not do on every system
@@ -79,6 +80,7 @@ class StopSignals:
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self.received = number
         if self._at_once:
+            self._raised = True  # before the block is left: the thread may look only then
             raise Interrupted(number)
 
     def _watch(self) -> None:
@@ -89,5 +91,5 @@ class StopSignals:
             came += 1
             if came > 1:
                 os._exit(128 + numbers[0])
-            if not self._at_once:
+            if not self._at_once and not self._raised:
                 print(f"jmorl: {self.says}", file=sys.stderr, flush=True)

@@ -166,11 +166,11 @@ def test_people_are_told(folder, events, config, capsys):
     for table in run_tables(read_run(folder)):
         console.print(table)
     told = capsys.readouterr().out
-    assert "on 8 fresh episodes, 99 % sure; " in told and " in the search" in told
+    assert "the mean of 8 fresh episodes, 99 % sure" in told and "in the search it was" in told
     from jmorl.display.console import PlainConsole
 
     watcher("lines", config, envs.make(config.env).objectives, PlainConsole()).show(events[-1])
-    assert "on 8 fresh episodes, 99 % sure; " in capsys.readouterr().out
+    assert "the mean of 8 fresh episodes, 99 % sure" in capsys.readouterr().out
 
 
 def test_a_result_that_lost_part_of_its_confirmed_score_is_named(folder, tmp_path):

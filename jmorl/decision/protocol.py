@@ -125,7 +125,7 @@ class Question(AnyQuestion):
         try:
             self.policy(answer.policy)
             for each in answer.ranking:
-                replace(self, others=()).policy(each)
+                self.policy(each)
         except ValueError as error:
             raise AnswerError(str(error)) from None
         if answer.ranking and self.form != "pair" and answer.ranking[0] != answer.policy:

@@ -24,7 +24,7 @@ FORMS: dict[Shows, Form] = {"front": "best", "few": "best", "pair": "pair", "ran
 TRUSTED_REGRET = {"steer": 0.07, "final": 0.02}
 DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
 FEWEST_AGAINST = 2  # other answers that it may be against
-EARLIER_ANSWERS = "your earlier answers speak for it, and asking you could hardly improve on it"
+EARLIER_ANSWERS = "by your earlier answers it is the best, or about {regret:.0%} of the front's range short of it"
 SKIPPED = "you skipped the question, and it is the best by your earlier answers"
 FEW = 5  # policies in a short question
 
@@ -56,13 +56,14 @@ class StandIn(Wrapper):
         super().__init__(user)
         self.seed = seed
         history = list(history)
-        own = [each for each in history if isinstance(each, DecisionRecord) and not by_stand_in(each)]
-        self.answers = [answer for answer in map(_said, own) if answer]
         self.ask = "always" if user.patient else ask
         self.shows = shows
         self.ask_now = ask_now
         decisions = [each for each in history if isinstance(each, DecisionRecord)]
-        self.limits = next((each.answer.limits for each in reversed(decisions) if each.limits), None)
+        self.answers: list[Comparison] = []
+        self.limits: tuple[float, ...] | None = None
+        for each in decisions:
+            self._take_note(each)
         self.chose_last = bool(decisions) and by_stand_in(decisions[-1])
 
     def decide(self, question: AnyQuestion) -> tuple[AnyQuestion, Any]:
@@ -85,7 +86,9 @@ class StandIn(Wrapper):
         asked = self._shortened(question, model, verdict)
         if self._is_sure(question, verdict) and not self.ask_now and not self.user.remembers(asked):
             self.chose_last = True
-            return question, Answer(question.front[verdict.best].id, stand_in=True, reason=EARLIER_ANSWERS)
+            return question, Answer(
+                question.front[verdict.best].id, stand_in=True, reason=EARLIER_ANSWERS.format(regret=verdict.regret)
+            )
         self.ask_now = False
         return self._heard(question, asked)
 
@@ -112,22 +115,27 @@ class StandIn(Wrapper):
         """Ask the user, and take note of what they say. Return the question as they saw it, and the answer."""
         self.chose_last = False
         answer: Answer = self.user.respond(asked)
-        if asked.form == "best" and not answer.equal and not _is_shown(asked, answer.policy):
+        unseen = asked.form == "best" and not answer.equal and not _is_shown(asked, answer.policy)
+        if unseen or not all(_is_shown(asked, each) for each in answer.ranking):
             asked = asked.whole  # which they wanted to see
         if asked.form == "pair" and not answer.ranking and not answer.equal and _is_shown(asked, answer.policy):
             answer = replace(answer, ranking=(answer.policy,))
-        self.limits = answer.limits or self.limits
+        self._take_note(decision_record(asked, asked.checked(answer)))
         if answer.stand_in:  # a log of a question that was skipped
             self.chose_last = True
             return asked, answer
-        said = _said(decision_record(asked, asked.checked(answer)))
-        self.answers += [said] if said else []
         if answer.equal and asked.again:  # they see no reason to take back what they have just chosen
             answer = replace(answer, policy=asked.front[1].id)
         elif not answer.stop and (answer.equal or (asked.form == "pair" and answer.ranking)):
             whole = asked.whole
             answer = replace(answer, policy=whole.front[self._model(whole).verdict().best].id)
         return asked, answer
+
+    def _take_note(self, record: DecisionRecord) -> None:
+        """Learn from an answer, and remember the limits that it sets; a stand-in's teaches nothing."""
+        self.limits = record.answer.limits or self.limits
+        said = None if by_stand_in(record) else _said(record, self.limits)
+        self.answers += [said] if said else []
 
     def wants_question(self, generation: int) -> bool:
         """Return whether the user wants to be asked before this generation; then nobody answers for them."""
@@ -203,12 +211,19 @@ def _is_shown(question: Question, policy: int) -> bool:
     return policy in [each.id for each in question.front]
 
 
-def _said(record: DecisionRecord) -> Comparison | None:
-    """Return what a record says of the policies that were shown; None if there was no other policy."""
+def _said(record: DecisionRecord, limits: tuple[float, ...] | None) -> Comparison | None:
+    """Return what a record says of the policies that were shown; None if there was no other policy.
+
+    Where the best of them reaches the limits in force, what does not is ruled out by these, and tells nothing else.
+    """
     shown = {each.policy: each.values for each in record.shown}
     ranking = () if record.equal else record.ranking or (record.policy,)
     if not record.equal and not record.ranking:
         shown.setdefault(record.policy, record.values)  # they like none of those shown better
+    if limits:
+        good = {policy: values for policy, values in shown.items() if np.all(np.array(values) >= limits)}
+        if good and (not ranking or ranking[0] in good):
+            shown, ranking = good, tuple(policy for policy in ranking if policy in good)
     if len(shown) < 2:
         return None
     rows = list(shown)

@@ -1,6 +1,7 @@
 """A person at a terminal, asked in text. Works with piped input, too."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -14,13 +15,14 @@ from jmorl.display.console import PlainConsole
 from jmorl.display.readings import direction
 
 LONGEST_NUMBER = 9  # digits
+COMPARISON = re.compile(r"([<>]=?|[≤≥])")
 POLICY_HELP = """\
 A policy is one way to act that was trained. Its scores are means over episodes,
 ± their spread from episode to episode. {directions}.
 To choose otherwise later: jmorl branch RUN --round K --out NEW.
   12           choose policy 12
   if 12        say what choosing policy 12 would mean
-  Enter        keep the last choice: none of these is better
+  Enter        keep the last choice, while it is in the front: none is better
   12 4 9       prefer policy 12, then 4, then 9, to all others
   same         no difference between these
   pair         ask about two policies instead, whose comparison tells most
@@ -89,7 +91,7 @@ class TerminalUser(DecisionMaker):
                 case int():
                     show_front(self.console, question, by=reply)
                 case str() if line is None:
-                    raise EOFError("the input ended before a policy was chosen; continue the run to be asked again")
+                    raise EOFError(f"the input ended, and nothing is chosen. {reply} Resume the run to be asked again")
                 case str():
                     self._say(reply)
 
@@ -143,7 +145,7 @@ def policy_reply(question: Question, line: str) -> Answer | Instead | If | int |
     if words[:1] == ["best"]:
         return _objective(question.objectives, " ".join(words[1:]))
     if words[:1] == ["limit"]:
-        return _limits(question, words[1:])
+        return _limits(question, COMPARISON.sub(r" \1 ", line.lower().replace("−", "-").replace(",", ".")).split()[1:])
     if words == ["same"]:
         kept = question.previous in [policy.id for policy in question.whole.front]
         return Answer(question.previous if kept and question.previous is not None else question.front[0].id, equal=True)
@@ -232,7 +234,7 @@ def _policy(question: Question, named: str | None) -> int | str:
     if named is None and previous is None:
         return f"There is no last choice yet; {hint}."
     if named is None and previous not in ids:
-        return f"Your last choice is no longer in the front; {hint}."
+        return f"Your last choice is no longer in the front: a later policy is better in everything; {hint}."
     number = previous if named is None else _number(named)
     if number is None:
         return f"I do not understand {named!r}; {hint}."
@@ -262,7 +264,8 @@ def _ranking(question: Question, words: list[str]) -> tuple[int, ...] | str:
 
 def _limits(question: Question, words: list[str]) -> tuple[float, ...] | str:
     """Return all limits, with one objective's changed; a sentence if the words do not say how."""
-    *named, value = words or [""]
+    compared = [word for word in words if COMPARISON.fullmatch(word)]
+    *named, value = [word for word in words if word not in compared] or [""]
     index = _objective(question.objectives, " ".join(named)) if named else ""
     if isinstance(index, str):
         name = question.objectives[-1].name
@@ -277,8 +280,12 @@ def _limits(question: Question, words: list[str]) -> tuple[float, ...] | str:
         number = math.nan
     if number is not None and not math.isfinite(number):
         return f"A limit is a number, or none; {value!r} is neither."
+    objective = question.objectives[index]
+    if any((sign[0] in "<≤") != objective.read.less_is_better for sign in compared):
+        most = "most" if objective.read.less_is_better else "least"
+        return f"{objective.label}: {direction(objective)}. So a limit says at {most}: limit {objective.name} {value}"
     limits = list(question.limits or [-math.inf] * len(question.objectives))
-    limits[index] = -math.inf if number is None else question.objectives[index].read.to_return(number)
+    limits[index] = -math.inf if number is None else objective.read.to_return(number)
     return tuple(limits)
 
 

@@ -68,7 +68,8 @@ def limits_in_words(question: Question) -> str:
     named = bounds_in_words(limits, [Writer(objective, "g") for objective in question.objectives])
     count = int(within(question.values, limits).sum())
     if count:
-        return f"Your limits: {named}. {count} of these {len(question.front)} reach them."
+        reach = "reaches" if count == 1 else "reach"
+        return f"Your limits: {named}. {count} of these {len(question.front)} {reach} them."
     return f"Your limits: {named}. None of these reaches them; limit NAME none takes one back."
 
 

@@ -61,6 +61,11 @@ def front_table(
     return table
 
 
+def final_title(chosen: Policy) -> str:
+    """Return the heading of a run's last front; where the result has another score, too, it says whose these are."""
+    return "Final front, by the scores of the search" if chosen.confirmation else "Final front"
+
+
 def _origin(policy: Policy) -> str:
     """Say what a blend is of."""
     if policy.blend is None:

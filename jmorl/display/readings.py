@@ -73,7 +73,7 @@ def bounds_in_words(bounds: Sequence[float] | np.ndarray, writers: Sequence[Writ
 
 
 def confirmed_in_words(policy: Policy, objectives: Sequence[Objective]) -> str:
-    """`time 58.2 ±0.4, ... on 128 fresh episodes, 99 % sure; time 57.9, ... in the search`; or nothing."""
+    """`mean time 58.2 ±0.4, ... of 128 fresh episodes, 99 % sure with one odd episode more; ...`; or nothing."""
     found = policy.confirmation
     if found is None:
         return ""
@@ -83,4 +83,7 @@ def confirmed_in_words(policy: Policy, objectives: Sequence[Objective]) -> str:
         for writer, value, error in zip(writers, policy.values, found.error, strict=True)
     )
     claimed = values_in_words(found.claimed, writers)
-    return f"{scores} on {found.episodes} fresh episodes, 99 % sure; {claimed} in the search"
+    return (
+        f"{scores}: the mean of {found.episodes} fresh episodes, 99 % sure, with room for one odd episode; "
+        f"in the search it was {claimed}"
+    )

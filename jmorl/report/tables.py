@@ -11,7 +11,7 @@ from rich.text import Text
 import envs
 from envs.core import Objective
 from jmorl.decision.records import DecisionRecord
-from jmorl.display.fronts import front_table, stacked_label
+from jmorl.display.fronts import final_title, front_table, stacked_label
 from jmorl.display.readings import Writer, bounds_in_words, confirmed_in_words, writers_for
 from jmorl.display.tables import PlainTable
 from jmorl.display.text import (
@@ -25,7 +25,7 @@ from jmorl.display.text import (
 )
 from jmorl.learning.rollout import EpisodeReturns
 from jmorl.search.metrics import coverage
-from jmorl.search.policy import rescored, values_of
+from jmorl.search.policy import values_of
 from jmorl.search.prediction import COVERAGE
 from jmorl.storage.notes_file import Note
 from jmorl.storage.policy_file import policy_name
@@ -36,10 +36,9 @@ def run_tables(run: StoredRun) -> list[RenderableType]:
     """Heading, metrics, decisions and final front of a run, to be printed one after the other."""
     decisions = [decisions_table(run)] if run.decisions else []
     chosen = run.chosen
-    members = rescored(run.front, filter(None, [chosen]))
     noted = {policy_id: _noted(note) for policy_id, note in run.notes.policies.items()}
-    front = front_table(members, run.objectives, chosen.id if chosen else None, noted=noted)
-    front.title = "Final front" if run.result else "Front so far"
+    front = front_table(run.front, run.objectives, chosen.id if chosen else None, noted=noted)
+    front.title = final_title(chosen) if chosen else "Front so far"
     tables: list[RenderableType] = [run_heading(run), metrics_table(run), *decisions, front]
     return [part for table in tables for part in (table, "")]
 

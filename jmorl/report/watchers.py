@@ -13,13 +13,13 @@ import numpy as np
 from envs.core import Objective
 from jmorl.config import Config
 from jmorl.display.console import PlainConsole
-from jmorl.display.fronts import front_table
+from jmorl.display.fronts import final_title, front_table
 from jmorl.display.readings import bounds_in_words, confirmed_in_words, values_in_words, writers_for
 from jmorl.display.text import REASONS, duration, number, plural, short_count
 from jmorl.events import Blended, Compiled, Decided, Event, GenerationFinished, Resumed, RunFinished
 from jmorl.report.timeline import Timeline
 from jmorl.search.families import Blending
-from jmorl.search.policy import Confirmation, Policy, rescored
+from jmorl.search.policy import Confirmation, Policy
 
 
 class Watcher(ABC):
@@ -222,6 +222,7 @@ def question_name(decided: Decided) -> str:
     """Name the question, and who answered it if nobody was asked."""
     question = decided.question
     name = "final choice" if question.purpose == "final" else f"choice for round {question.generation}"
+    name += ", asked again" if getattr(question, "again", False) else ""
     return name if question.was_asked(decided.answer) else f"the stand-in's {name}"
 
 
@@ -249,13 +250,13 @@ def _more_of_answer(decided: Decided) -> str:
     ranking, equal = getattr(decided.answer, "ranking", ()), getattr(decided.answer, "equal", False)
     if equal:
         return ", no difference between them"
-    return f", in the order {', '.join(map(str, ranking))}" if ranking else ""
+    return f", in the order {', '.join(map(str, ranking))}" if len(ranking) > 1 else ""
 
 
 def show_result(console: PlainConsole, event: RunFinished, objectives: tuple[Objective, ...]) -> None:
-    """Show the final front, with the chosen policy marked."""
-    table = front_table(rescored(event.state.archive.members, [event.chosen]), objectives, event.chosen.id)
-    table.title = "Final front"
+    """Show the final front by the scores of the search, with the chosen policy marked."""
+    table = front_table(event.state.archive.members, objectives, event.chosen.id)
+    table.title = final_title(event.chosen)
     console.print()
     console.print(table)
 

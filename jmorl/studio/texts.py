@@ -11,7 +11,7 @@ import envs
 from envs.core import Objective
 from jmorl.display import questions
 from jmorl.display.commands import command
-from jmorl.display.readings import Writer, values_in_words, writers_for
+from jmorl.display.readings import Writer, bounds_in_words, values_in_words, writers_for
 from jmorl.display.text import duration, minus, number, plural, short_count
 from jmorl.report.timeline import Timeline
 from jmorl.search.bounds import within
@@ -30,6 +30,7 @@ LIMITS_HINT = (
     "Say what each objective must reach. What does not is left out of the table and grey in the chart; with your next "
     "answer the search keeps to it, too."
 )
+NO_NUMBER = "a number, please"
 WARM_UP = "The first policies learn the basics. You soon see how they do."
 EARLY = "The first policies, still learning. You are asked when the warm-up is over."
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
@@ -66,6 +67,10 @@ NONE_REACHES = "None of them reaches your limits."
 LAST_ROUND = "This is the last round: after it you choose the result."
 BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
 SCORING = "Scoring …"
+PROGRESS_HINT = (
+    "The hypervolume measures all that the front is better than: it grows whenever a policy is found that is better "
+    "than what there was."
+)
 REPLACED = "No longer in the front: a later policy is better in everything"
 NAME, NOTE = "Name", "Note"
 NOTES_PROBLEM = "Names and notes cannot be shown: {problem}"
@@ -277,7 +282,17 @@ def end_with(view: View, selection: Selection, policy: Policy) -> str:
     """Name a way to end the run: with which policy, by letter, number, name and scores."""
     letter = selection.letters.get(policy.id)
     name = f"{letter}, {policy_name(view, policy.id)}" if letter else policy_name(view, policy.id)
-    return f"End with {name}: {minus(values_in_words(policy.values, writers_of(view)))}"
+    values = minus(values_in_words(policy.values, writers_of(view)))
+    missed = missed_limits(view, selection, policy)
+    return f"End with {name}: {values}{f' – not within your limit: {missed}' if missed else ''}"
+
+
+def missed_limits(view: View, selection: Selection, policy: Policy) -> str:
+    """Return the limits that a policy does not reach: `time ≤ 80`; nothing where it reaches all."""
+    if selection.limits is None:
+        return ""
+    missed = np.where(policy.values < selection.limits, selection.limits, -np.inf)
+    return minus(bounds_in_words(missed, [Writer(objective, "g") for objective in view.objectives]))
 
 
 def standing(view: View, policy: Policy) -> str:

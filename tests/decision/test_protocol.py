@@ -83,12 +83,12 @@ def test_what_is_no_answer_is_refused_in_one_sentence(given, sentence):
         QUESTION.checked(given())
 
 
-def test_a_policy_that_is_not_shown_can_be_chosen_but_not_ranked():
+def test_a_policy_that_is_not_shown_can_be_chosen_and_ranked():
     short = replace(QUESTION, front=FRONT[:1], others=FRONT[1:])
     assert short.checked(Answer(7)) == Answer(7)
-    with pytest.raises(AnswerError, match="policy 7 is not among the policies shown"):
-        short.checked(Answer(3, ranking=(3, 7)))
-    assert short.whole.checked(Answer(3, ranking=(3, 7))).ranking == (3, 7)
+    assert short.checked(Answer(3, ranking=(3, 7))).ranking == (3, 7)
+    with pytest.raises(AnswerError, match="policy 8 is not among the policies shown"):
+        short.checked(Answer(3, ranking=(3, 8)))
 
 
 @pytest.mark.parametrize(("given", "kept"), [(3, 3), (np.int64(7), 7), (FRONT[1], 7), (None, None)])

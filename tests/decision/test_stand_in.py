@@ -378,6 +378,17 @@ def test_a_few_are_ranked_and_the_run_goes_on_with_the_first(growing):
         assert answer == ranks(asked)
 
 
+@pytest.mark.parametrize("shows", ["few", "pair", "rank"])
+def test_who_has_all_listed_can_put_any_in_order(growing, shows):
+    def says(question):
+        order = best_first(question.whole)
+        return Answer(order[0], ranking=order[:3])
+
+    decided, _ = live(StandIn(Says(says), 1, ask="always", shows=shows), growing(3))
+    for asked, answer in decided:
+        assert answer.ranking == best_first(asked.whole)[:3] and answer.policy == answer.ranking[0]
+
+
 def test_rankings_leave_less_to_ask_than_best_ones(growing):
     one, other = Says(chooses), Says(ranks)
     live(StandIn(one, 1, shows="few"), growing(10))
@@ -413,6 +424,22 @@ def test_limits_hold_for_the_stand_in_too(growing):
     model_free = StandIn(Says(None), 1, written(decided[:2]))
     assert question.policy(later.decide(question)[1].policy).values[0] >= 60
     assert question.policy(model_free.decide(question)[1].policy).values[0] < 60
+
+
+def test_what_a_limit_rules_out_is_no_rival_that_lost(ask):
+    """All that has more of the first objective misses the limit on the second: nothing is said against the first."""
+    front = [[80, 3], [60, 4], [40, 5], [20, 6], [10, 7]]
+    limits = (-np.inf, 6.5)
+    _, answer = StandIn(Says(lambda question: Answer(14, limits=limits)), 1, ask="always").decide(ask(front))
+    assert answer.policy == 14
+    question = ask(front, generation=1)
+    assert not StandIn(Says(None), 1, written([(question, Answer(14, limits=limits))])).answers
+    wider = ask([*front, [15, 6.8], [5, 9]], generation=2)
+    stand_in = StandIn(Says(None), 1, written([(question, Answer(14, limits=limits)), (wider, Answer(15))]))
+    [said] = stand_in.answers
+    assert said.shown.tolist() == [[10, 7], [15, 6.8], [5, 9]] and said.ranking == (1,)
+    nothing_reaches = StandIn(Says(None), 1, written([(question, Answer(14, limits=(-np.inf, 70.0)))]))
+    assert len(nothing_reaches.answers[0].shown) == 5
 
 
 def varied(question):

@@ -122,6 +122,7 @@ def test_the_end_of_the_input_is_the_same_as_q(ask):
         ("best speed", "Best in what?"),
         ("best 0", "Best in what?"),
         ("best 3", "Best in what?"),
+        ("limit fuel <= -45", "fuel label: more is better. So a limit says at least: limit fuel -45"),
         ("if", "Say which policy, for example: if 10"),
         ("if 99", "There is no policy 99"),
         ("if 10 12", "Say which policy"),
@@ -139,7 +140,7 @@ def test_mistakes_are_explained_and_asked_again(ask, line, sentence):
 
 @pytest.mark.parametrize("line", ["", "q", "go 5"])
 @pytest.mark.parametrize(
-    ("previous", "sentence"), [(None, "There is no last choice yet"), (9, "no longer in the front")]
+    ("previous", "sentence"), [(None, "There is no last choice yet"), (9, "no longer in the front: a later policy is better in everything")]
 )
 def test_without_a_last_choice_in_the_front_one_must_choose(ask, line, previous, sentence):
     session = Session(line, "12")
@@ -148,7 +149,7 @@ def test_without_a_last_choice_in_the_front_one_must_choose(ask, line, previous,
 
 
 def test_the_input_ending_before_any_choice_is_an_error_not_a_loop(ask):
-    with pytest.raises(EOFError, match="before a policy was chosen; continue the run to be asked again"):
+    with pytest.raises(EOFError, match="nothing is chosen. There is no last choice yet.* Resume the run"):
         Session("what?").user.answer(ask(VALUES))
 
 
@@ -209,7 +210,8 @@ def test_numbers_may_be_written_as_people_write_them(ask):
     question = ask([[-70, -40], [-60, -50], [-50, -60]])
     for line in ("12, 10, 11", "12 > 10 > 11", "12 10 11"):
         assert policy_reply(question, line) == Answer(12, ranking=(12, 10, 11))
-    assert policy_reply(question, "limit 2 −45") == (-np.inf, -45.0)
+    for line in ("limit 2 −45", "limit fuel >= -45", "limit fuel>-45", "limit fuel ≥ -45,0"):
+        assert policy_reply(question, line) == (-np.inf, -45.0)
 
 
 def test_undecodable_input_gets_the_help(ask):
@@ -229,7 +231,7 @@ def test_help(ask, line):
     session.user.answer(ask(VALUES))
     for text in (
         "  12           choose policy 12\n",
-        "  Enter        keep the last choice: none of these is better\n",
+        "  Enter        keep the last choice, while it is in the front: none is better\n",
         "  12 4 9       prefer policy 12, then 4, then 9, to all others\n",
         "  same         no difference between these\n",
         "  limit fuel -40\n               rule out what does not reach this; none takes it back\n",

@@ -90,5 +90,6 @@ def test_a_confirmed_score_has_the_digits_of_its_error():
         confirmation=confirmation,
     )
     assert confirmed_in_words(policy, (TIME, SPEED)) == (
-        "time 58.23 ±0.41, speed 4.060 ±0.012 on 128 fresh episodes, 99 % sure; time 57.90, speed 4.100 in the search"
+        "time 58.23 ±0.41, speed 4.060 ±0.012: the mean of 128 fresh episodes, 99 % sure, with room for one odd "
+        "episode; in the search it was time 57.90, speed 4.100"
     )

@@ -33,21 +33,40 @@ class LimitsPanel:
         limits = selection.limits or (-math.inf,) * len(view.objectives)
         self.showing = True
         for number, objective, least in zip(self.numbers, view.objectives, limits, strict=True):
-            number.set_value(float(objective.read.of(least)) if math.isfinite(least) else None)
+            now = _number(number.value)
+            wanted = float(objective.read.of(least)) if math.isfinite(least) else None
+            if now != wanted:  # what somebody has typed stays as it is
+                number.set_value("" if wanted is None else f"{wanted:g}")
         self.showing = False
         for label, told in zip(self.ranges, texts.ranges(view), strict=True):
             label.set_text(told)
         self.reached.set_text(texts.limits_reached(view, selection))
 
-    def _add_row(self, index: int) -> tuple[ui.number, ui.label]:
+    def _add_row(self, index: int) -> tuple[ui.input, ui.label]:
         objective = self.tab.view.objectives[index]
         name = f"{reading_label(objective)}, at {'most' if objective.read.less_is_better else 'least'}"
         ui.label(name)
-        number = ui.number(on_change=lambda event: self._set(index, event.value)).classes("limit")
-        number.props('dense outlined clearable debounce=400 placeholder="anything"').props["aria-label"] = name
+        number = ui.input(
+            on_change=lambda event: self._set(index, event.value),
+            validation=lambda text: texts.NO_NUMBER if math.isnan(_number(text) or 0.0) else None,
+        ).classes("limit")
+        number.props(
+            'dense outlined clearable hide-bottom-space debounce=400 inputmode=decimal placeholder="anything"'
+        ).props["aria-label"] = name
         return number, ui.label().classes("point-side")
 
-    def _set(self, index: int, value: float | None) -> None:
-        if not self.showing:
+    def _set(self, index: int, text: str | None) -> None:
+        value = _number(text)
+        if not self.showing and (value is None or not math.isnan(value)):
             objective = self.tab.view.objectives[index]
             self.tab.limit(index, None if value is None else objective.read.to_return(value))
+
+
+def _number(text: str | None) -> float | None:
+    """Return the number that somebody has written, with a point or a comma; None for nothing, NaN for no number."""
+    written = (text or "").strip().replace("\N{MINUS SIGN}", "-").replace(",", ".")
+    try:
+        value = float(written) if written else None
+    except ValueError:
+        return math.nan
+    return value if value is None or math.isfinite(value) else math.nan

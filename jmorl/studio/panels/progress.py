@@ -2,6 +2,7 @@
 
 from nicegui import ui
 
+from jmorl.studio import texts
 from jmorl.studio.charts.curves import curve_options
 from jmorl.studio.panels.drawing import draw
 from jmorl.studio.panels.panel import Shown
@@ -14,7 +15,9 @@ class ProgressPanel:
     def __init__(self, tab: Tab):
         self.tab = tab
         self.drawn = Shown()
-        self.curves = ui.echart({})
+        with ui.element("div").classes("curves"):
+            ui.label(texts.PROGRESS_HINT).classes("explanation")
+            self.curves = ui.echart({})
 
     def show(self) -> None:
         """Draw the curves after a new view."""
