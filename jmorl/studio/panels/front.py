@@ -32,7 +32,8 @@ class FrontPanel:
             with ui.element("div").classes("chart"):
                 self.points = ui.echart({}, on_point_click=self._look_at)
                 self.marks = ui.echart({}).classes("overlay")
-            self.outlook = ui.label().classes("outlook").props('aria-live="polite"')
+            # It scrolls where it does not fit: keys must reach it.
+            self.outlook = ui.label().classes("outlook").props('aria-live="polite" tabindex=0')
             _add_legend()
 
     def show(self) -> None:
