@@ -171,6 +171,7 @@ def _add_studio(commands: Any) -> None:
     studio.add_argument("--host", default="127.0.0.1", help="address to listen on (default: this machine alone)")
     studio.add_argument("--port", type=_port, default=8080, help="default: 8080")
     studio.add_argument("--token", help="what the page asks for (default: none on this machine, else a random one)")
+    studio.add_argument("--watch-token", help="what the address for watching asks for (default: a random one)")
     _add_new_run(studio)
     _add_settings(studio, studio.add_argument_group("settings of a new run"), Config, "")
 

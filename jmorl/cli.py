@@ -207,13 +207,18 @@ def _studio(options: argparse.Namespace) -> None:
 
     server.check_address(options.host, options.port)
     token = options.token or (None if is_loopback(options.host) else secrets.token_urlsafe())
+    watch_token = options.watch_token or secrets.token_urlsafe()
+    if watch_token == token:
+        raise ConfigError(["--watch-token must not be --token: who may watch could steer, too"])
+    address = server.address(options.host, options.port, token)
     session = Session(runs=_home_folder(options))
     with StopSignals() as stop:
         try:
             _open(session, options)
-            print(f"The studio is at {server.address(options.host, options.port, token)} (Ctrl-C ends it)", flush=True)
+            print(f"The studio is at {address} (Ctrl-C ends it)", flush=True)
+            print(f"Others can watch, and nothing else, at {server.watch_address(address, watch_token)}", flush=True)
             with stop.interruptible():
-                server.serve(session, options.host, options.port, token)
+                server.serve(session, options.host, options.port, token, watch_token)
         except Interrupted as error:
             if session.is_open:
                 error.add_note(f"what the run has is kept; open it again with: {command('studio', session.view.path)}")

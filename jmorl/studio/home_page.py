@@ -7,6 +7,7 @@ from typing import Any
 from nicegui import ui
 
 from jmorl.studio import texts
+from jmorl.studio.access import STEERS, Access, Tone
 from jmorl.studio.home import Home, printable
 from jmorl.studio.home_tab import HomeTab
 from jmorl.studio.look import KINDS, dress
@@ -16,7 +17,6 @@ from jmorl.studio.panels.panel import Panel
 from jmorl.studio.panels.run_form import RunForm
 from jmorl.studio.panels.run_list import RunList
 from jmorl.studio.session import Session
-from jmorl.studio.tab import Tone
 
 REFRESH_SECONDS = 0.5  # of what is going on
 READ_SECONDS = 2.0  # between two times that the folder is read
@@ -26,8 +26,10 @@ REST = 4  # times as long as reading took, it is not read again: training has th
 class HomePage:
     """The panels of one browser tab on the home page, and the messages over them."""
 
-    def __init__(self, session: Session, home: Home, kept: MutableMapping[str, Any] | None = None):
-        self.tab = tab = HomeTab(session, home, self._show, self._tell, self._go, kept)
+    def __init__(
+        self, session: Session, home: Home, kept: MutableMapping[str, Any] | None = None, access: Access = STEERS
+    ):
+        self.tab = tab = HomeTab(session, home, self._show, self._tell, self._go, kept, access)
         dress()
         self.panels: list[Panel] = [Lost(lambda: home.folder)]
         with ui.element("div").classes("home") as self.root:
@@ -35,10 +37,15 @@ class HomePage:
                 with ui.element("h1").classes("brand"):
                     ui.label("jmorl studio")
                 ui.label(printable(home.folder)).classes("run-name")
-                ui.link(texts.NEW_RUN, "#new-run").classes("to-form")
+                if access.watching:
+                    ui.label(texts.WATCHING).classes("watching").tooltip(texts.WATCHING_HINT)
+                else:
+                    ui.link(texts.NEW_RUN, "#new-run").classes("to-form")
             self.panels.append(OpenRun(tab))
             with ui.element("div").classes("home-main"):
-                self.panels += [RunList(tab), RunForm(tab)]
+                self.panels.append(RunList(tab))
+                if not access.watching:
+                    self.panels.append(RunForm(tab))
         self._show()
         ui.timer(REFRESH_SECONDS, self._show)
         self.timer = ui.timer(READ_SECONDS, self._read)

@@ -13,17 +13,18 @@ from jmorl.config import ConfigError
 from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
 from jmorl.studio import texts
+from jmorl.studio.access import STEERS, Access, Tone, steering
 from jmorl.studio.form import Form, environments
 from jmorl.studio.home import Home, ListedRun
 from jmorl.studio.session import Session
-from jmorl.studio.tab import Tone
 
 
 class HomeTab:
     """The runs below a folder as a tab lists them, and what somebody who sits at it can do.
 
     `show` is called when the tab holds something new, `tell` puts a message on the page, and `go` leads to the page of
-    the open run. `kept` outlives a reload of the page: the form is kept there.
+    the open run. `kept` outlives a reload of the page: the form is kept there. With an `access` for watching, runs are
+    listed, and none can be opened or begun.
     """
 
     def __init__(
@@ -34,8 +35,9 @@ class HomeTab:
         tell: Callable[[str, Tone], None],
         go: Callable[[], None],
         kept: MutableMapping[str, Any] | None = None,
+        access: Access = STEERS,
     ):
-        self.session, self.home = session, home
+        self.session, self.home, self.access = session, home, access
         self.show, self.tell, self.go = show, tell, go
         self.kept = {} if kept is None else kept
         self.runs: tuple[ListedRun, ...] | None = None  # None until they are read
@@ -51,6 +53,7 @@ class HomeTab:
         self.runs = self.runs if runs == self.runs else runs
         self.show()
 
+    @steering
     async def open(self, name: str) -> None:
         """Open a run of the list."""
         found = next((each for each in self.runs or () if each.name == name), None)
@@ -66,6 +69,7 @@ class HomeTab:
         self.form = self.kept["form"] = replace(self.form, **fields)
         self.show()
 
+    @steering
     async def begin(self) -> None:
         """Begin the run of the form, or show what is wrong with it."""
         if not self.at_work:

@@ -5,8 +5,8 @@ from typing import Literal
 
 from nicegui import ui
 
+from jmorl.studio.access import Tone
 from jmorl.studio.charts.chart_style import BLUE
-from jmorl.studio.tab import Tone
 
 STYLE = Path(__file__).parent / "studio.css"
 DARK_RED = "#B34700"  # enough contrast for text

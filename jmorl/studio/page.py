@@ -6,6 +6,7 @@ from typing import Any
 from nicegui import ui
 
 from jmorl.studio import texts
+from jmorl.studio.access import STEERS, Access, Tone
 from jmorl.studio.look import KINDS, dress
 from jmorl.studio.panels.between import BetweenPanel
 from jmorl.studio.panels.cards import Cards
@@ -25,8 +26,9 @@ from jmorl.studio.panels.parallel import ParallelPanel
 from jmorl.studio.panels.policy_table import PolicyTable
 from jmorl.studio.panels.progress import ProgressPanel
 from jmorl.studio.panels.question_bar import QuestionBar
+from jmorl.studio.panels.share import Share
 from jmorl.studio.session import Session
-from jmorl.studio.tab import Tab, Tone
+from jmorl.studio.tab import Tab
 
 REFRESH_SECONDS = 0.1
 SIDE: dict[str, Callable[[Tab], Panel]] = {
@@ -42,14 +44,17 @@ SIDE: dict[str, Callable[[Tab], Panel]] = {
 class Page:
     """The panels of one browser tab, and the messages over them."""
 
-    def __init__(self, session: Session, kept: MutableMapping[str, Any] | None = None):
-        self.tab = tab = Tab(session, self._show, self._tell, kept, self._renew)
+    def __init__(self, session: Session, kept: MutableMapping[str, Any] | None = None, access: Access = STEERS):
+        self.tab = tab = Tab(session, self._show, self._tell, kept, self._renew, access)
         dress()
         self.panels: list[Panel] = [Lost(lambda: tab.view.path)]
         with ui.element("div").classes("studio") as self.root:
             with ui.element("header").classes("bar"):
                 self.panels.append(Header(tab))
-                Keys(tab)
+                with ui.element("div").classes("tools"):
+                    if access.link:
+                        Share(tab)
+                    Keys(tab)
             with ui.element("div").classes("top"):
                 self.panels += [Introduction(tab), QuestionBar(tab), EndingDialog(tab)]
                 self.panels += [NoteDialog(tab), ComparisonDialog(tab)]

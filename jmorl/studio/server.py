@@ -11,10 +11,10 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from urllib.parse import quote, urlencode
+from urllib.parse import quote, urlencode, urlsplit
 
 import jax
-from fastapi import HTTPException
+from fastapi import HTTPException, Request
 from fastapi.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from nicegui import app, ui
 
@@ -26,9 +26,10 @@ from jmorl.report.plots import draw_run
 from jmorl.storage.layout import Layout
 from jmorl.storage.policy_file import StoredPolicy, load_policy, write_stored_policy
 from jmorl.storage.stored_run import read_run
+from jmorl.studio.access import Access
 from jmorl.studio.between import blended
 from jmorl.studio.episodes import episode_json
-from jmorl.studio.guard import Guard
+from jmorl.studio.guard import WATCH, Guard
 from jmorl.studio.home import Home
 from jmorl.studio.home_page import HomePage
 from jmorl.studio.page import Page
@@ -61,12 +62,21 @@ def address(host: str, port: int, token: str | None) -> str:
     return f"http://{name}:{port}/" + (f"?{urlencode({'token': token})}" if token else "")
 
 
-def serve(session: Session, host: str, port: int, token: str | None) -> None:
-    """Serve the pages, in a thread of its own, until something is raised here: signals are for the caller to hear."""
+def watch_address(steering: str, token: str) -> str:
+    """Return the address to watch at, of a studio with a page for steering at the address `steering`."""
+    parts = urlsplit(steering)
+    return f"{parts.scheme}://{parts.netloc}{WATCH}/?{urlencode({'token': token})}"
+
+
+def serve(session: Session, host: str, port: int, token: str | None, watch_token: str | None = None) -> None:
+    """Serve the pages, in a thread of its own, until something is raised here: signals are for the caller to hear.
+
+    `token` and `watch_token` are those of `Guard`.
+    """
     app.config.quasar_config["loadingBar"]["skipHijack"] = True  # a bar at the top, without a name for who hears it
-    app.add_middleware(Guard, host=host, token=token)
+    app.add_middleware(Guard, host=host, token=token, watch_token=watch_token)
     logging.getLogger("uvicorn.error").addFilter(is_trouble)
-    _add_pages(session, Home(session.runs))
+    _add_pages(session, Home(session.runs), bool(token), watch_token)
     _add_files(session)
 
     serving = threading.Thread(target=_run, args=(host, port), name="server", daemon=True)
@@ -79,21 +89,29 @@ def serve(session: Session, host: str, port: int, token: str | None) -> None:
             serving.join()
 
 
-def _add_pages(session: Session, home: Home) -> None:
-    """Serve the page of the open run at `/`, and the home page at `/runs`, where `/` leads while no run is open."""
+def _add_pages(session: Session, home: Home, guarded: bool, watch_token: str | None) -> None:
+    """Serve the page of the open run at `/`, and the home page at `/runs`, where `/` leads while no run is open.
+
+    The guard has them below its doors: each page may do what its own address allows.
+    """
+
+    def access(request: Request) -> Access:
+        if request.scope["watching"]:
+            return Access(watching=True)
+        return Access(link=watch_address(str(request.url), watch_token) if watch_token else "", guarded=guarded)
 
     @ui.page("/")
-    async def run_page() -> Response | None:
+    async def run_page(request: Request) -> Response | None:
         if not session.is_open:
-            return RedirectResponse("/runs")
+            return RedirectResponse(f"{request.scope['root_path']}/runs")
         if await _connected():
-            Page(session, app.storage.tab)
+            Page(session, app.storage.tab, access(request))
         return None
 
     @ui.page("/runs")
-    async def home_page() -> None:
+    async def home_page(request: Request) -> None:
         if await _connected():
-            HomePage(session, home, app.storage.tab)
+            HomePage(session, home, app.storage.tab, access(request))
 
 
 async def _connected() -> bool:

@@ -8,7 +8,7 @@ panel and no widget.
 import math
 from collections.abc import Callable, MutableMapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from nicegui import run
 
@@ -18,6 +18,7 @@ from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
 from jmorl.storage.notes_file import Note
 from jmorl.studio import texts
+from jmorl.studio.access import STEERS, Access, Tone, steering
 from jmorl.studio.between import BlendScore
 from jmorl.studio.comparison import Comparison
 from jmorl.studio.dialogue import Dialogue
@@ -26,7 +27,6 @@ from jmorl.studio.selection import Selection, last_choice, listed, to_begin_with
 from jmorl.studio.session import Session
 from jmorl.studio.view import View
 
-Tone = Literal["hint", "warning", "failure"]
 Result = TypeVar("Result")
 
 
@@ -53,7 +53,7 @@ class Tab:
 
     A run is open. `show` is called when the tab holds something new; `tell` puts a message on the page. `kept` outlives
     a reload of the page: what is laid out is kept there. `renew` reloads the page, whose panels are made for the
-    objectives of a run, when one with others was opened.
+    objectives of a run, when one with others was opened. With an `access` for watching, commands that steer do nothing.
     """
 
     def __init__(
@@ -63,8 +63,9 @@ class Tab:
         tell: Callable[[str, Tone], None],
         kept: MutableMapping[str, Any] | None = None,
         renew: Callable[[], None] = lambda: None,
+        access: Access = STEERS,
     ):
-        self.session = session
+        self.session, self.access = session, access
         self.view, self.dialogue = session.view, session.dialogue
         self.kept = {} if kept is None else kept
         self.selection = Selection()
@@ -145,6 +146,7 @@ class Tab:
                 self.tell(texts.NOTES_PROBLEM.format(problem=self._told), "failure")
         self.show()
 
+    @steering
     def choose(self, policy: int) -> None:
         """Answer the open question as this tab shows it."""
         question = self.view.question
@@ -157,6 +159,7 @@ class Tab:
         else:
             self.answer(question, Answer(policy, generations=self.generations))
 
+    @steering
     def say_equal(self) -> None:
         """Answer that there is no difference between the policies of the open question."""
         question = self.view.question
@@ -165,11 +168,13 @@ class Tab:
             kept = last.id if last and self.view.choosable(last.id) else question.front[0].id
             self.answer(question, Answer(kept, generations=self.generations, equal=True))
 
+    @steering
     def skip(self) -> None:
         """Have the open question answered by the earlier answers."""
         if self.view.question:
             self.answer(self.view.question, Skip())
 
+    @steering
     def ask_pair(self) -> None:
         """Have a question about two policies in place of the open one."""
         if self.view.question:
@@ -183,12 +188,14 @@ class Tab:
         self._lay_out(replace(self.selection, limits=tuple(limits)))
         self.show()
 
+    @steering
     def keep(self) -> None:
         """Choose what was chosen last, or what has replaced it."""
         kept = last_choice(self.view)
         if kept:
             self.choose(kept.id)
 
+    @steering
     def stop(self) -> None:
         """Have the end of the run confirmed, with the last choice as its result, or the policy in focus."""
         last, focus = last_choice(self.view), self.selection.focus
@@ -202,6 +209,7 @@ class Tab:
         else:
             self.tell("First click a policy that can be chosen: the one that the run shall end with.", "hint")
 
+    @steering
     def end(self, policy: int) -> None:
         """End the run with a policy, as somebody has confirmed, wherever the focus is now."""
         ending, self.ending = self.ending, None
@@ -218,20 +226,24 @@ class Tab:
         self.ending = None
         self.show()
 
+    @steering
     def ask_now(self) -> None:
         """Have the next question asked before the next generation."""
         self.session.ask_now()
         self.follow()
 
+    @steering
     async def pause(self) -> None:
         """Leave the run after the generation that is going on; it can be taken up from there."""
         self._tell_of_wait("Pausing")
         await self._in_background(self.session.leave)
 
+    @steering
     async def train_on(self, rounds: int) -> None:
         """Go on where the run ended, for some more generations, in a branch."""
         await self._in_background(self.session.train_on, max(rounds, 1))
 
+    @steering
     def answer(self, question: Question, answer: Answer | Instead) -> None:
         """Answer a question that this tab has shown, with the limits set in it; a second click does nothing more."""
         if question is self._settled:
@@ -289,19 +301,23 @@ class Tab:
         self._lay_out(replace(self.selection, favourites=only))
         self.show()
 
+    @steering
     async def favour(self, policy: int) -> None:
         """Make a policy a favourite, or one no longer."""
         favourite = not self.view.noted.policy(policy).favourite
         await self._in_background(self.session.note, self.view.run, policy, favourite=favourite)
 
+    @steering
     def edit_policy(self, policy: int) -> None:
         """Begin to write the name and the note of a policy."""
         self._edit(Editing(self.view.run, policy, f"policy {policy}", self.view.noted.policy(policy)))
 
+    @steering
     def edit_run(self, branch: Branch) -> None:
         """Begin to write the name and the note of a run in the history."""
         self._edit(Editing(branch.run, None, branch.name, branch.noted.run))
 
+    @steering
     async def save_note(self, name: str, text: str) -> None:
         """Keep the name and the note that somebody has written, and nothing that they have not changed."""
         editing = self.editing
@@ -354,30 +370,36 @@ class Tab:
             self.side = side
             self.show()
 
+    @steering
     async def step_back(self, run_id: str, generation: int) -> None:
         """Ask an earlier question again, in a branch."""
         self._tell_of_wait("Stepping back")
         await self._in_background(self.session.step_back, run_id, generation)
 
+    @steering
     async def switch(self, run_id: str) -> None:
         """Open another branch, or go on with the one that is open."""
         self._tell_of_wait("Opening")
         await self._in_background(self.session.switch, run_id)
 
+    @steering
     async def begin_dialogue(self, iterations: int, points: int) -> None:
         """Begin E-NAUTILUS on the front."""
         await self._in_background(self.session.begin_dialogue, iterations, points)
 
+    @steering
     async def reply(self, at: Dialogue, answer: PointAnswer) -> None:
         """Answer in E-NAUTILUS, in the dialogue as this tab shows it."""
         if await self._in_background(self.session.reply, at, answer) is False:
             self.tell("The dialogue has moved on in another tab; nothing has changed.", "warning")
 
+    @steering
     def undo_reply(self) -> None:
         """Take the last answer in E-NAUTILUS back."""
         self.session.undo_reply()
         self.follow()
 
+    @steering
     def close_dialogue(self) -> None:
         """Leave E-NAUTILUS."""
         self.session.close_dialogue()

@@ -33,6 +33,27 @@ LIMITS_HINT = (
 NO_NUMBER = "a number, please"
 WARM_UP = "The first policies learn the basics. You soon see how they do."
 EARLY = "The first policies, still learning. You are asked when the warm-up is over."
+WATCHED = (
+    "This page is for watching. Policies are trained that trade {objectives} against each other. After a round of "
+    "training a person says which one they like best; the next round searches around it. “You” on this page is that "
+    "person. Look at policies, play and compare them as you like: it changes nothing for anybody else."
+)
+WATCHING, ONLY_WATCHING = "Only watching", "Nothing has changed: this page is for watching."
+WATCHING_HINT = "“You” on this page is the person who steers."
+OTHERS_ANSWER = "Somebody else answers."
+NO_DIALOGUE = "Nobody is going through E-NAUTILUS just now. When somebody does, it is shown here."
+SHARE, SHARE_TITLE, SHARE_LINK = "Share", "Let others watch", "Address for watching"
+SHARE_RIGHTS = (
+    "Whoever has this address sees the run that is open, its history, and the list of runs. They can look at policies, "
+    "play and compare them, and save files.",
+    "They cannot answer, end or pause a run, open or begin one, go back in the history, or change names and notes.",
+)
+SHARE_GUARDED = "It leads nowhere else: steering takes another token."
+SHARE_OPEN = (
+    "But mind: the studio is served on this machine alone, where steering takes no token. Whoever reaches it, here or "
+    "through a tunnel, can leave out /watch and steer. If they must not, start it with a --token."
+)
+COPY, COPIED, COPY_YOURSELF = "Copy", "The address is copied.", "It could not be copied; mark the address, and copy it."
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
 SKIP, SKIP_HINT = (
     "Skip",
@@ -153,9 +174,9 @@ def phase(view: View, now: float, leaving: bool = False) -> str:
     return "Thinking"
 
 
-def title(view: View) -> str:
-    """Name the browser's tab after the run, and say there that a question waits."""
-    return f"{'Your turn: ' if view.question else ''}{printable(view.path.name)} – jmorl studio"
+def title(view: View, watching: bool = False) -> str:
+    """Name the browser's tab after the run, and say there that a question waits, to somebody who can answer it."""
+    return f"{'Your turn: ' if view.question and not watching else ''}{printable(view.path.name)} – jmorl studio"
 
 
 def facts(view: View, now: float) -> str:
@@ -237,6 +258,11 @@ def remarks(view: View, policy: Policy) -> str:
     """Say in the table what else there is to know of a policy: its name, and that it is no longer in the front."""
     replaced = "no longer in the front" if policy.id in view.replaced else ""
     return ", ".join(filter(None, (view.noted.policy(policy.id).name, replaced)))
+
+
+def watched(objectives: Sequence[Objective]) -> str:
+    """Say to somebody new who only watches what happens here."""
+    return WATCHED.format(objectives=questions.joined([objective.label for objective in objectives]))
 
 
 def objectives(labels: Sequence[str]) -> str:

@@ -27,14 +27,14 @@ def chromium():
 class Tab:
     """One tab on the studio. What goes wrong in it, or leaves this machine, is noted."""
 
-    def __init__(self, browser, address):
+    def __init__(self, browser, address, start=None):
         self.page = browser.new_page(viewport={"width": 1280, "height": 720}, reduced_motion="no-preference")
         self.page.set_default_timeout(PATIENCE)
         self.problems = []
         self.page.on("pageerror", lambda error: self.problems.append(str(error)))
         self.page.on("request", self._note_request)
         self.address = address
-        self.page.goto(address)
+        self.page.goto(start or address)
 
     def _note_request(self, request):
         if not request.url.startswith((self.address, self.address.replace("http", "ws"), "data:", "blob:")):

@@ -20,7 +20,7 @@ from jmorl.storage.stored_run import read_run
 from jmorl.studio.server import is_trouble
 from tests.registered import ThreeWays
 from tests.resuming import train
-from tests.studio.serving import Served
+from tests.studio.serving import Served, free_port
 
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport="
 NAME = "<img src=x onerror=alert(1)>"
@@ -45,7 +45,7 @@ def studio(runs):
 def guarded(runs):
     """Serve on all addresses of this machine, with a token."""
     shutil.copytree(runs / NAME, runs / "other")
-    with Served(runs / "other", "--token", "sesame", host="0.0.0.0") as served:
+    with Served(runs / "other", "--token", "sesame", "--watch-token", "peek", host="0.0.0.0") as served:
         yield served
 
 
@@ -58,9 +58,9 @@ def run_of(runs):
     return read_manifest(runs / NAME)["run"]
 
 
-def is_open(served, origin, cookie=None):
-    """Return whether the server opens its web socket to a page of this origin."""
-    url = f"ws://127.0.0.1:{served.port}{SOCKET}websocket"
+def is_open(served, origin, cookie=None, root=""):
+    """Return whether the server opens its web socket, or that below `root`, to a page of this origin."""
+    url = f"ws://127.0.0.1:{served.port}{root}{SOCKET}websocket"
     try:
         with connect(url, origin=origin, additional_headers={"Cookie": cookie} if cookie else None) as socket:
             return socket.recv(timeout=10).startswith("0{")  # Engine.IO's greeting
@@ -195,8 +195,33 @@ def test_the_address_is_printed_with_the_token(guarded, studio):
     assert f":{guarded.port}/?token=sesame" in guarded.log[-1] and "token" not in studio.log[-1]
 
 
+def test_who_watches_is_served_below_watch_and_nowhere_else(guarded, runs, chosen):
+    run = read_manifest(runs / "other")["run"]
+    doors = ["/", "/runs", f"/policies/{run}/{chosen}.npz", f"/journeys/{run}.html", SOCKET + "polling"]
+    with httpx.Client(follow_redirects=True) as browser:
+        assert browser.get(guarded.address + "/watch/?token=sesame").status_code == 401
+        page = browser.get(guarded.address + "/watch?token=peek")
+        assert page.status_code == 200 and str(page.url) == guarded.address + "/watch/"
+        assert '"/_nicegui' not in page.text and "/watch/_nicegui" in page.text  # what it asks for is behind its door
+        for door in doors:
+            assert browser.get(f"{guarded.address}/watch{door}").status_code == 200, door
+            for other in (door, f"/watch/..{door}", f"/watch/%2e%2e{door}", f"/watch//{door}"):
+                answer = browser.get(guarded.address + other)
+                assert answer.status_code in (401, 404), other
+    watches = "jmorl_studio_watch=peek"
+    assert is_open(guarded, guarded.address, watches, "/watch")
+    assert not is_open(guarded, guarded.address, watches)
+    assert not is_open(guarded, guarded.address, "jmorl_studio=peek")
+    assert not is_open(guarded, "http://evil.example", watches, "/watch")
+
+
+def test_who_watches_must_not_have_the_token_that_steers(runs, capsys):
+    assert main(["studio", str(runs), "--token", "same", "--watch-token", "same", "--port", str(free_port())]) != 0
+    assert "--watch-token must not be --token" in capsys.readouterr().err
+
+
 def test_over_a_folder_of_runs_nothing_is_open_and_every_door_leads_home(runs, chosen):
-    with Served(runs, "--token", "sesame", host="0.0.0.0") as served:
+    with Served(runs, "--token", "sesame", "--watch-token", "peek", host="0.0.0.0") as served:
         for door in ("/", "/runs"):
             assert httpx.get(served.address + door).status_code == 401
         with httpx.Client(follow_redirects=True) as browser:
@@ -208,6 +233,9 @@ def test_over_a_folder_of_runs_nothing_is_open_and_every_door_leads_home(runs, c
                 "/fronts/x.csv",
             ):
                 assert browser.get(served.address + path).status_code == 404  # of no open run's history
+            watched = browser.get(served.address + "/watch/?token=peek")
+            assert watched.url.path == "/watch/runs" and watched.status_code == 200
+    assert any(line.startswith("Others can watch") and "/watch/?token=peek" in line for line in served.log)
 
 
 def test_the_home_page_is_there_beside_an_open_run(studio):

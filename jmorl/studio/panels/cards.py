@@ -101,6 +101,8 @@ class Card:
         noted = view.noted.policy(self.policy.id)
         self.star.set_icon("star" if noted.favourite else "star_border")
         self.star.props(f"aria-pressed={str(noted.favourite).lower()}")
+        for button in (self.star, self.edit):
+            button.set_visibility(not self.tab.access.watching)
         self.edit.set_icon("edit_note" if noted.text else "edit")
         for label, text in ((self.name, noted.name), (self.note, noted.text)):
             label.set_text(text)
@@ -110,7 +112,7 @@ class Card:
         self.standing.set_visibility(bool(standing) or not noted.name)  # without either its line stays free
         self.beside.set_text(texts.beside(view, selection, self.policy))
         self.remark.set_text(texts.remark(view, self.policy))
-        self.choose.set_visibility(view.choosable(self.policy.id))
+        self.choose.set_visibility(view.choosable(self.policy.id) and not self.tab.access.watching)
         final = view.question is not None and view.question.purpose == "final"
         self.choose.set_text(f"{self.letter} is the result" if final else f"Choose {self.letter}")
         self.choose.props(remove="outline" if focused else "", add="" if focused else "outline")

@@ -25,6 +25,8 @@ class Header:
         with ui.element("div").classes("meter").props('role="progressbar" aria-label="Budget used"'):
             self.meter = ui.element("div")
         self.facts = ui.label().classes("facts")
+        if tab.access.watching:
+            ui.label(texts.WATCHING).classes("watching").tooltip(texts.WATCHING_HINT)
 
     def show(self) -> None:
         """Show a new view at once, and otherwise, once a second, what changes with time alone."""
@@ -33,7 +35,7 @@ class Header:
         if not self.shown.is_new(view) and now < self.next_tick:
             return
         self.next_tick = now + TICK_SECONDS
-        title = texts.title(view)
+        title = texts.title(view, self.tab.access.watching)
         if self.titled.is_new(title):
             ui.page_title(title)
         self.run_name.set_text(f"{printable(view.noted.run.named(view.path.name))} · {view.config.env}")

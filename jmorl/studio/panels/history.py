@@ -51,12 +51,13 @@ class HistoryPanel:
         with item.style(f"margin-left: {18 * branch.depth}px"):
             with ui.element("div").classes("branch-head"):
                 ui.label(printable(branch.title)).classes("branch-name")
-                edit = ui.button(icon="edit", on_click=lambda: self.tab.edit_run(branch))
-                edit.props("flat dense round size=xs").props["aria-label"] = (
-                    f"name and note of {printable(branch.name)}"
-                )
+                if not self.tab.access.watching:
+                    edit = ui.button(icon="edit", on_click=lambda: self.tab.edit_run(branch))
+                    edit.props("flat dense round size=xs").props["aria-label"] = (
+                        f"name and note of {printable(branch.name)}"
+                    )
                 ui.label(_state(branch, is_open)).classes("branch-state")
-                if not is_open:
+                if not is_open and not self.tab.access.watching:
                     open_it = ui.button("Open", on_click=lambda: self.tab.switch(branch.run))
                     open_it.props("no-caps dense outline size=sm")
             if branch.noted.run.text or branch.noted.problem:
@@ -87,7 +88,7 @@ class HistoryPanel:
                     self._add_way_back(branch, generation)
 
     def _add_way_back(self, branch: Branch, generation: int) -> None:
-        if generation - 1 in branch.checkpoints:
+        if generation - 1 in branch.checkpoints and not self.tab.access.watching:
             back = ui.button("Choose otherwise", on_click=lambda: self.tab.step_back(branch.run, generation))
             back.props("no-caps dense flat size=sm")
 

@@ -3,6 +3,7 @@
 from nicegui import ui
 
 from jmorl.display.questions import introduction
+from jmorl.studio import texts
 from jmorl.studio.tab import Tab
 
 # The browser remembers who has read them; the page then never shows them, not even for a moment.
@@ -19,7 +20,8 @@ class Introduction:
 
     def __init__(self, tab: Tab):
         with ui.element("section").classes("bar introduction").props('aria-label="Introduction"'):
-            ui.label(introduction(tab.view.objectives))
+            watching, objectives = tab.access.watching, tab.view.objectives
+            ui.label(texts.watched(objectives) if watching else introduction(objectives))
             ui.button("Got it").props("no-caps dense flat").on("click", js_handler=REMEMBER)
 
     def show(self) -> None:

@@ -7,6 +7,8 @@ from jmorl.display.readings import reading_label
 from jmorl.studio import texts
 from jmorl.studio.tab import Tab
 
+STEERING = ("=", "c", "f", "k")  # keys of commands that steer
+
 
 class Keys:
     """The keys of a tab, and the button that lists them."""
@@ -18,6 +20,8 @@ class Keys:
             ui.label("Keys").classes("title")
             with ui.element("dl").classes("keys"):
                 for key, what in texts.KEYS:
+                    if tab.access.watching and key in STEERING:
+                        continue
                     with ui.element("dt"):
                         ui.label(key)
                     with ui.element("dd"):

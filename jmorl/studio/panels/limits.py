@@ -29,7 +29,8 @@ class LimitsPanel:
         view, selection = self.tab.view, self.tab.selection
         if not self.shown.is_new(view, selection):
             return
-        self.hint.set_text(texts.LIMITS_LATER if view.result else texts.LIMITS_HINT)
+        later = view.result or self.tab.access.watching
+        self.hint.set_text(texts.LIMITS_LATER if later else texts.LIMITS_HINT)
         limits = selection.limits or (-math.inf,) * len(view.objectives)
         self.showing = True
         for number, objective, least in zip(self.numbers, view.objectives, limits, strict=True):

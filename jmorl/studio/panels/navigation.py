@@ -34,7 +34,9 @@ class NavigationPanel:
             return
         self.body.clear()
         with self.body:
-            if dialogue is None:
+            if dialogue is None and self.tab.access.watching:
+                ui.label(texts.NO_DIALOGUE).classes("explanation")
+            elif dialogue is None:
                 self._add_beginning()
             elif dialogue.chosen:
                 self._add_end(dialogue)
@@ -61,6 +63,8 @@ class NavigationPanel:
         ).classes("explanation")
         for number, point in enumerate(question.points, start=1):
             self._add_point(dialogue, question, number, point)
+        if self.tab.access.watching:
+            return
         with ui.element("div").classes("controls"):
             iterations = _number("iterations left", state.iterations_left)
             points = _number("points in each", state.points)
@@ -86,18 +90,21 @@ class NavigationPanel:
             with ui.element("div").classes("point-side"):
                 ui.label(f"{point.closeness:.0f} % of the way")
                 ui.label(f"{plural(int(point.reachable.sum()), 'policy')} left")
-            choose = ui.button("Prefer", on_click=lambda: self.tab.reply(dialogue, Choose(number - 1)))
-            choose.props("no-caps dense outline")
+            if not self.tab.access.watching:
+                choose = ui.button("Prefer", on_click=lambda: self.tab.reply(dialogue, Choose(number - 1)))
+                choose.props("no-caps dense outline")
 
     def _add_end(self, dialogue: Dialogue) -> None:
         chosen = dialogue.chosen
         assert chosen
         ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {texts.scores(self.tab.view, chosen)}.").classes("ending")
-        if self.tab.view.choosable(chosen.id):
+        if self.tab.view.choosable(chosen.id) and not self.tab.access.watching:
             ui.label("It is laid out below, where you can choose it.").classes("explanation")
         with ui.element("div").classes("controls"):
             look = ui.button("Look at it", on_click=lambda: self.tab.look_at(chosen.id))
             look.props("no-caps dense color=primary")
+            if self.tab.access.watching:
+                return
             undo = ui.button("Step back", on_click=self.tab.undo_reply).props("no-caps dense outline")
             undo.set_enabled(dialogue.before is not None)
             ui.button("Begin again", on_click=self.tab.close_dialogue).props("no-caps dense flat")

@@ -128,7 +128,7 @@ export default {
       const src = this.src;
       if (!src) return;
       try {
-        const response = await fetch(src);
+        const response = await fetch(window.path_prefix + src);
         if (!response.ok) throw new Error((await response.json().catch(() => ({}))).detail ?? "the server failed");
         const episode = Object.freeze(await response.json());
         if (src !== this.src) return; // another one is wanted by now

@@ -45,7 +45,9 @@ class QuestionBar:
         with self.buttons:
             if view.front:
                 self._add_more()
-            if view.question:
+            if self.tab.access.watching and not view.result:
+                ui.label(texts.OTHERS_ANSWER).classes("explanation")
+            elif view.question:
                 self._add_answers()
             elif view.result:
                 self._add_result()
@@ -106,6 +108,8 @@ class QuestionBar:
             for what, address in texts.MORE_FILES.items():
                 ui.item(what, on_click=lambda address=address: ui.download(address.format(run=view.run)))
         ui.button("How it came about", on_click=lambda: self.tab.turn_to(texts.HISTORY)).props("no-caps dense outline")
+        if self.tab.access.watching:
+            return
         ui.button("Train on for", on_click=self._train_on).props("no-caps dense outline").tooltip(texts.TRAIN_ON_HINT)
         number = ui.number(value=self.rounds, min=1, max=1000, format="%d", on_change=self._set_rounds)
         number.props('dense outlined aria-label="rounds to train on for"').classes("count")

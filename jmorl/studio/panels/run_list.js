@@ -1,4 +1,4 @@
-// The list of runs: a row for each, which opens its run. Words in the field keep the rows that have all of them.
+// The list of runs: a row for each, which opens its run where `opens` is true. Words in the field keep the rows that have all of them.
 //
 // A row is { name, state, cells: [[text, text below it], ...], written }, `written` in seconds since the epoch.
 const MANY = 8; // runs, from which on there is a field for words
@@ -16,7 +16,7 @@ export default {
         </div>
         <div v-for="row in listed" :key="row.name" role="row" :class="['runs-row', row.state]">
           <span v-for="([text, below], index) in row.cells" :key="index" role="cell">
-            <button v-if="index === 0" type="button" class="runs-open" @click="$emit('open', row.name)">{{ text }}</button>
+            <button v-if="index === 0 && opens" type="button" class="runs-open" @click="$emit('open', row.name)">{{ text }}</button>
             <b v-else-if="text">{{ text }}</b>
             <small v-if="below">{{ below }}</small>
           </span>
@@ -25,7 +25,7 @@ export default {
       </div>
       <p v-else class="runs-none" role="status">{{ rows.length ? texts.none : empty }}</p>
     </div>`,
-  props: { rows: Array, columns: Array, texts: Object, empty: String },
+  props: { rows: Array, columns: Array, texts: Object, empty: String, opens: Boolean },
   data: () => ({ words: "", now: Date.now() / 1000 }),
   computed: {
     listed() {

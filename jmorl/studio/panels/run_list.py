@@ -25,6 +25,7 @@ class RunList:
         self.rows.props["rows"] = []
         self.rows.props["texts"] = {"filter": texts.FILTER, "none": texts.NO_MATCH}
         self.rows.props["empty"] = texts.READING
+        self.rows.props["opens"] = not tab.access.watching
         self.rows.on("open", lambda event: tab.open(str(event.args)))
 
     def show(self) -> None:
