@@ -9,6 +9,7 @@ from jmorl.studio import texts
 from jmorl.studio.access import STEERS, Access, Tone
 from jmorl.studio.look import KINDS, dress
 from jmorl.studio.panels.between import BetweenPanel
+from jmorl.studio.panels.call import Call
 from jmorl.studio.panels.cards import Cards
 from jmorl.studio.panels.comparison import ComparisonDialog
 from jmorl.studio.panels.ending import EndingDialog
@@ -52,6 +53,8 @@ class Page:
             with ui.element("header").classes("bar"):
                 self.panels.append(Header(tab))
                 with ui.element("div").classes("tools"):
+                    if not access.watching:
+                        self.panels.append(Call(tab))
                     if access.link:
                         Share(tab)
                     Keys(tab)

@@ -54,6 +54,7 @@ SHARE_OPEN = (
     "through a tunnel, can leave out /watch and steer. If they must not, start it with a --token."
 )
 COPY, COPIED, COPY_YOURSELF = "Copy", "The address is copied.", "It could not be copied; mark the address, and copy it."
+CALL, CALL_HINT = "Call me", "Call me when it is my turn"
 KEEP_HINT = "What you chose last, or what is now better than that in everything."
 SKIP, SKIP_HINT = (
     "Skip",

@@ -9,6 +9,7 @@ import envs
 from jmorl.storage.resume import Continued
 from jmorl.storage.run_folder import RunFolder
 from jmorl.studio.session import Session
+from tests.registered import ThreeWays
 from tests.studio.browsing import chromium
 
 PATIENCE = 120  # seconds until a test fails that waits in vain
@@ -42,6 +43,14 @@ class Watched(Session):
 def browser():
     with chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="module")
+def small(small_config, tmp_path_factory):
+    """Return the settings of a short run: three generations of an environment that any process knows by its module."""
+    config = tmp_path_factory.mktemp("config") / "config.toml"
+    config.write_text(small_config.replace(env=f"tests.registered:{ThreeWays.id}").to_toml())
+    return "--config", config
 
 
 @pytest.fixture(scope="session")

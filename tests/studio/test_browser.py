@@ -9,7 +9,6 @@ import pytest
 
 from jmorl.storage.policy_file import load_policy
 from jmorl.storage.stored_run import read_run
-from tests.registered import ThreeWays
 from tests.studio.browsing import Tab
 from tests.studio.serving import Served, free_port
 
@@ -19,14 +18,6 @@ LEFT_OR_ENDED = """(left) => document.querySelector('[aria-label="iterations lef
   || document.querySelector(".ending")"""
 REPLACED = "has replaced your last choice"
 CHART = """getElement(document.querySelector(".front .nicegui-echart").id.slice(1)).chart"""
-
-
-@pytest.fixture(scope="module")
-def small(small_config, tmp_path_factory):
-    """Return the settings of a short run: three generations of an environment that any process knows by its module."""
-    config = tmp_path_factory.mktemp("config") / "config.toml"
-    config.write_text(small_config.replace(env=f"tests.registered:{ThreeWays.id}").to_toml())
-    return "--config", config
 
 
 def decisions(path):

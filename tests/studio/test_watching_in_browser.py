@@ -1,4 +1,6 @@
-"""Watching in a real browser."""
+"""Watching, and being called when a question waits, in a real browser."""
+
+import json
 
 import pytest
 
@@ -9,8 +11,29 @@ pytestmark = pytest.mark.studio
 STATES = (("", "light", (1280, 720)), ("-dark", "dark", (1280, 720)), ("-phone", "light", (390, 844)))
 STEERING = (
     *("Choose", "Keep", "Skip", "Compare two", "Stop here", "Pause training", "Ask me", "Train on", "Begin", "Prefer"),
-    *("Open", "favourite:", "name and note", "Share"),
+    *("Open", "favourite:", "name and note", "Call me", "Share"),
 )  # what buttons are called that do more than show
+# What a page sounds and notifies, in place of a person who hears and sees it.
+RECORDED = """
+  window.tones = [];
+  window.notes = [];
+  window.OscillatorNode = class extends OscillatorNode {
+    start(at) {
+      tones.push(at);
+      super.start(at);
+    }
+  };
+  window.Notification = class {
+    static permission = "default";
+    static async requestPermission() {
+      return (Notification.permission = "granted");
+    }
+    constructor(title) {
+      notes.push(title);
+    }
+  };
+  document.hasFocus = () => sessionStorage.getItem("away") === null;
+"""
 
 
 def looked_at_everywhere(tab, name, found, dialog=False):
@@ -121,3 +144,42 @@ def test_who_has_the_link_sees_it_all_and_steers_nothing(browser, tmp_path):
         assert not steers.problems and not watches.problems
     assert {state: barriers for state, barriers in found.items() if barriers} == {}
     assert len((path / "decisions.jsonl").read_text().splitlines()) == 1
+
+
+def test_who_is_away_is_called_once_for_each_question_if_they_wish(browser, small, tmp_path):
+    path, found = tmp_path / "run", {}
+    with Served("--out", path, *small) as studio:
+        tab = Tab(browser, studio.address)
+        page = tab.page
+        page.add_init_script(RECORDED)
+        page.reload()
+        calls = lambda: page.evaluate("[tones.length, notes.length]")  # noqa: E731
+        switch = page.get_by_role("button", name="Call me when it is my turn")
+        tab.asked(1)
+        assert switch.get_attribute("aria-pressed") == "false"
+        page.evaluate("sessionStorage.setItem('away', 'yes')")
+        tab.choose(0)
+        tab.asked(2)
+        assert calls() == [0, 0]  # nobody wishes for it
+        switch.click()
+        page.locator('[aria-label="Call me when it is my turn"][aria-pressed="true"]').wait_for()
+        assert calls() == [2, 0] and page.evaluate("Notification.permission") == "granted"  # how it sounds
+        looked_at_everywhere(tab, "36-called", found)
+        tab.choose(0)
+        tab.asked(3)
+        page.wait_for_function("notes.length === 1")
+        assert calls() == [4, 1] and page.evaluate("notes") == ["Your turn: run – jmorl studio"]
+        page.reload()
+        tab.asked(3)
+        assert switch.get_attribute("aria-pressed") == "true" and calls() == [0, 0]  # this question is known
+        page.evaluate("sessionStorage.removeItem('away')")
+        tab.choose(0)
+        tab.final()
+        assert calls() == [0, 0]  # somebody looks
+        switch.click()
+        page.reload()
+        tab.final()
+        assert switch.get_attribute("aria-pressed") == "false"
+        assert not tab.problems
+    assert {state: barriers for state, barriers in found.items() if barriers} == {}
+    assert len([json.loads(line) for line in (path / "decisions.jsonl").read_text().splitlines()]) == 3
