@@ -67,7 +67,7 @@ def test_a_value_may_begin_with_a_minus_sign():
         (["paper", "--seeds", "1,x"], "argument --seeds: must be a whole number, not 'x'"),
         (
             ["branch", "run", "--generation", "last", "--out", "a"],
-            "argument --generation: must be a whole number, not 'la",
+            "argument --round/--generation: must be a whole number, not 'la",
         ),
         (["export", "run", "--policy", "best", "--to", "a"], "argument --policy: must be a whole number, not 'best'"),
     ],

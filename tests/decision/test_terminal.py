@@ -140,7 +140,7 @@ def test_mistakes_are_explained_and_asked_again(ask, line, sentence):
 
 @pytest.mark.parametrize("line", ["", "q", "go 5"])
 @pytest.mark.parametrize(
-    ("previous", "sentence"), [(None, "There is no last choice yet"), (9, "no longer in the front: a later policy is better in everything")]
+    ("previous", "sentence"), [(None, "There is no last choice yet"), (9, "a later policy is better in everything")]
 )
 def test_without_a_last_choice_in_the_front_one_must_choose(ask, line, previous, sentence):
     session = Session(line, "12")
