@@ -6,7 +6,7 @@ from functools import wraps
 from inspect import iscoroutinefunction
 from typing import Concatenate, Literal, ParamSpec, Protocol, TypeVar, cast
 
-from jmorl.studio import texts
+from jmorl.studio import words
 
 Tone = Literal["hint", "warning", "failure"]
 
@@ -44,7 +44,7 @@ def steering(
     def steer(tab: AnyTab, *arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
         if not tab.access.watching:
             return command(tab, *arguments, **named)
-        tab.tell(texts.ONLY_WATCHING, "hint")
+        tab.tell(words.ONLY_WATCHING, "hint")
         return cast(Result, _nothing() if iscoroutinefunction(command) else None)
 
     return steer

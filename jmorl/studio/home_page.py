@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from jmorl.studio import texts
+from jmorl.studio import words
 from jmorl.studio.access import STEERS, Access, Tone
 from jmorl.studio.home import Home, printable
 from jmorl.studio.home_tab import HomeTab
@@ -38,9 +38,9 @@ class HomePage:
                     ui.label("jmorl studio")
                 ui.label(printable(home.folder)).classes("run-name")
                 if access.watching:
-                    ui.label(texts.WATCHING).classes("watching").tooltip(texts.WATCHING_HINT)
+                    ui.label(words.WATCHING).classes("watching").tooltip(words.WATCHING_HINT)
                 else:
-                    ui.link(texts.NEW_RUN, "#new-run").classes("to-form")
+                    ui.link(words.NEW_RUN, "#new-run").classes("to-form")
             self.panels.append(OpenRun(tab))
             with ui.element("div").classes("home-main"):
                 self.panels.append(RunList(tab))

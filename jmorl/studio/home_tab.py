@@ -12,7 +12,7 @@ from nicegui import run
 from jmorl.config import ConfigError
 from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
-from jmorl.studio import texts
+from jmorl.studio import words
 from jmorl.studio.access import STEERS, Access, Tone, steering
 from jmorl.studio.form import Form, environments
 from jmorl.studio.home import Home, ListedRun
@@ -58,7 +58,7 @@ class HomeTab:
         """Open a run of the list."""
         found = next((each for each in self.runs or () if each.name == name), None)
         if found is None:
-            self.tell(texts.GONE.format(name=name), "warning")
+            self.tell(words.GONE.format(name=name), "warning")
         elif not self.at_work:
             problems = await self._move(self.session.open, found.path)
             if problems:
@@ -74,7 +74,7 @@ class HomeTab:
         """Begin the run of the form, or show what is wrong with it."""
         if not self.at_work:
             form, self.problems = self.form, ()
-            name = form.name.strip() or texts.UNNAMED
+            name = form.name.strip() or words.UNNAMED
             self.problems = await self._move(self.session.begin, name, lambda: form.begin(self.home.folder))
             if not self.problems:
                 self.kept["form"] = replace(form, name="")

@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-from jmorl.studio import texts
+from jmorl.studio import words
 from jmorl.studio.access import STEERS, Access, Tone
 from jmorl.studio.look import KINDS, dress
 from jmorl.studio.panels.between import BetweenPanel
@@ -33,12 +33,12 @@ from jmorl.studio.tab import Tab
 
 REFRESH_SECONDS = 0.1
 SIDE: dict[str, Callable[[Tab], Panel]] = {
-    texts.POLICIES: PolicyTable,
-    texts.PROGRESS: ProgressPanel,
-    texts.HISTORY: HistoryPanel,
-    texts.LIMITS: LimitsPanel,
-    texts.NAVIGATION: NavigationPanel,
-    texts.BETWEEN: BetweenPanel,
+    words.POLICIES: PolicyTable,
+    words.PROGRESS: ProgressPanel,
+    words.HISTORY: HistoryPanel,
+    words.LIMITS: LimitsPanel,
+    words.NAVIGATION: NavigationPanel,
+    words.BETWEEN: BetweenPanel,
 }
 
 

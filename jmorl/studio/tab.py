@@ -17,7 +17,7 @@ from jmorl.decision.protocol import PointQuestion, Question
 from jmorl.learning.execution import ComputationFailed
 from jmorl.storage.checkpoints import CheckpointError
 from jmorl.storage.notes_file import Note
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.access import STEERS, Access, Tone, steering
 from jmorl.studio.between import BlendScore
 from jmorl.studio.comparison import Comparison
@@ -74,7 +74,7 @@ class Tab:
         self.comparison: Comparison | None = None  # of branches, that is looked at
         self.left_out: frozenset[str] = frozenset()  # ids of the runs that the comparison does not show
         self.axes = (0, 1)  # objectives of the chart of points: to the right, and upwards
-        self.side = texts.POLICIES  # title of the panel that is open at the side
+        self.side = words.POLICIES  # title of the panel that is open at the side
         self.covered = False  # by a dialog, which takes all keys
         self.generations = 1  # to go on for after the answer, before the next question
         self._settled: Question | None = None  # a question that whoever sits here knows to be answered
@@ -143,7 +143,7 @@ class Tab:
         if view.noted.problem != self._told:
             self._told = view.noted.problem
             if self._told:
-                self.tell(texts.NOTES_PROBLEM.format(problem=self._told), "failure")
+                self.tell(words.NOTES_PROBLEM.format(problem=self._told), "failure")
         self.show()
 
     @steering
@@ -339,7 +339,7 @@ class Tab:
         if found and len(found.fronts) > 1:
             self.comparison, self.left_out = found, frozenset()
         elif found:
-            self.tell(" ".join([texts.NOTHING_TO_COMPARE, *found.problems]), "hint")
+            self.tell(" ".join([words.NOTHING_TO_COMPARE, *found.problems]), "hint")
         self.show()
 
     async def compare_anew(self) -> None:

@@ -1,4 +1,4 @@
-"""The texts of the page."""
+"""What the page of a run says: sentences made of what there is to see. Words that never change are in `words`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,142 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
-import envs
 from envs.core import Objective
 from jmorl.display import questions
 from jmorl.display.commands import command
 from jmorl.display.readings import Writer, bounds_in_words, values_in_words, writers_for
-from jmorl.display.text import duration, minus, number, plural, short_count
+from jmorl.display.text import duration, minus, plural, short_count
 from jmorl.report.timeline import Timeline
 from jmorl.search.bounds import within
 from jmorl.search.policy import Policy
-from jmorl.storage.notes_file import LONGEST_NAME, LONGEST_TEXT
+from jmorl.storage.notes_file import LONGEST_NAME
+from jmorl.studio import words
 from jmorl.studio.between import EPISODES, BlendScore
-from jmorl.studio.home import Facts, Origin, printable
+from jmorl.studio.home import printable
 from jmorl.studio.selection import LETTERS, Selection, last_choice, reaching, wanted
 from jmorl.studio.view import PERSON, View
 
-# Titles of panels:
-POLICIES, PROGRESS, HISTORY, NAVIGATION, BETWEEN = "Policies", "Progress", "History", "E-NAUTILUS", "Between"
-LIMITS = "Limits"
-LIMITS_LATER = "What does not reach this is left out of the table and grey in the chart."
-LIMITS_HINT = (
-    "Say what each objective must reach. What does not is left out of the table and grey in the chart; with your next "
-    "answer the search keeps to it, too."
-)
-NO_NUMBER = "a number, please"
-WARM_UP = "The first policies learn the basics. You soon see how they do."
-EARLY = "The first policies, still learning. You are asked when the warm-up is over."
-WATCHED = (
-    "This page is for watching. Policies are trained that trade {objectives} against each other. After a round of "
-    "training a person says which one they like best; the next round searches around it. “You” on this page is that "
-    "person. Look at policies, play and compare them as you like: it changes nothing for anybody else."
-)
-WATCHING, ONLY_WATCHING = "Only watching", "Nothing has changed: this page is for watching."
-WATCHING_HINT = "“You” on this page is the person who steers."
-OTHERS_ANSWER = "Somebody else answers."
-NO_DIALOGUE = "Nobody is going through E-NAUTILUS just now. When somebody does, it is shown here."
-SHARE, SHARE_TITLE, SHARE_LINK = "Share", "Let others watch", "Address for watching"
-SHARE_RIGHTS = (
-    "Whoever has this address sees the run that is open, its history, and the list of runs. They can look at policies, "
-    "play and compare them, and save files.",
-    "They cannot answer, end or pause a run, open or begin one, go back in the history, or change names and notes.",
-)
-SHARE_GUARDED = "It leads nowhere else: steering takes another token."
-SHARE_OPEN = (
-    "But mind: the studio is served on this machine alone, where steering takes no token. Whoever reaches it, here or "
-    "through a tunnel, can leave out /watch and steer. If they must not, start it with a --token."
-)
-COPY, COPIED, COPY_YOURSELF = "Copy", "The address is copied.", "It could not be copied; mark the address, and copy it."
-CALL, CALL_HINT = "Call me", "Call me when it is my turn"
-KEEP_HINT = "What you chose last, or what is now better than that in everything."
-SKIP, SKIP_HINT = (
-    "Skip",
-    "You cannot say: the search goes on by your earlier answers, and learns nothing from this one.",
-)
-COMPARE_TWO = "Compare two"
-COMPARE_TWO_HINT = (
-    "You are asked about two policies instead, those whose comparison tells most. Training then goes on from the "
-    "policy that all your answers so far speak for."
-)
-ASK_NOW_HINT = "The next question comes when this round is over."
-TAKE_BACK_HINT = "You are asked the question that was answered for you, in a new branch."
-MORE_FILES = {
-    "The front as a table (CSV)": "/fronts/{run}.csv",
-    "The front as a picture (PNG)": "/pictures/{run}.png",
-    "The journey as a page (HTML)": "/journeys/{run}.html",
-}
-KEPT = "What the run had is kept."
-PUT_RIGHT = "Go on when that is put right."
-GOING_ON_FAILS = "Going on would fail in the same way: step back in the history, and choose otherwise."
-HOW_TO = "The policy file is saved. Put it beside your program, where jmorl is installed, and use it so:"
-PAUSE_HINT = "The run stops when this round is over, and can go on from there at any time."
-TRAIN_ON_HINT = "A new branch goes on where this run ended. This run and its result stay as they are."
-END_TITLE = "End the run?"
-END_EXPLANATION = "The policy becomes the result. You can step back in the history or train on at any time."
-END_LATER = "The run ends when this round is over."
-LOST = (
-    "The studio does not answer: nothing that you press counts now. What the run has is kept. This page goes on by "
-    "itself as soon as the studio is there again. If it was ended, start it again: {command}"
-)
-NONE_REACHES = "None of them reaches your limits."
-LAST_ROUND = "This is the last round: after it you choose the result."
-BETWEEN_HINT = "Lay out two policies. A dial then leads from one to the other: see what lies between them, and beyond."
-SCORING = "Scoring …"
-PROGRESS_HINT = (
-    "The hypervolume measures all that the front is better than: it grows whenever a policy is found that is better "
-    "than what there was."
-)
-REPLACED = "No longer in the front: a later policy is better in everything"
-NAME, NOTE = "Name", "Note"
-NOTES_PROBLEM = "Names and notes cannot be shown: {problem}"
-NOTE_HINT = f"A name has {LONGEST_NAME} characters at most, a note {LONGEST_TEXT:,}. They are kept with the run."
-COMPARE, COMPARED = "Compare branches", "Branches compared"
-COMPARE_HINT = "Stars are results. Policies that branches share lie over each other."
-NOTHING_TO_COMPARE = "There is nothing to compare yet: two branches with a front are needed."
 SHORT = 18  # characters of a name, in the line of the question
 SURELY = 3  # standard errors that a score must lie behind another to be called worse
-KEYS = (
-    ("← →", "look at the next policy along the front"),
-    ("↑ ↓", "in the table: look at the next row"),
-    ("1 2 …", "what is better in objective 1, 2, …; once more: all policies"),
-    ("=", "of two policies that are asked about, like one as much as the other"),
-    ("c", "choose the policy in focus"),
-    ("f", "make the policy in focus a favourite, or one no longer"),
-    ("k", "keep the last choice"),
-    ("x", "put the policy in focus away"),
-    ("space", "stop and start the playback"),
-    ("?", "these keys"),
-)
-
-# The home page:
-ALL_RUNS, GO_TO_RUN = "All runs", "Go to it"
-RUNS_COLUMNS = ("Run", "Environment", "Progress", "State", "Last written")
-READING, NO_RUNS = "Reading the folder …", "There is no run in this folder yet. Begin one with the form."
-FILTER, NO_MATCH = "Filter the runs", "No run has all these words."
-GONE = "{name} is no longer there."
-NEW_RUN, UNNAMED, BEGIN = "New run", "the new run", "Begin"
-STATES = {
-    "finished": "Finished",
-    "interrupted": "Interrupted",
-    "elsewhere": "Running elsewhere",
-    "damaged": "Damaged",
-}
-OPEN_HERE = "Open here"
-ENVIRONMENT, PRESET, STEPS, SEED = "Environment", "Preset", "Steps of training", "Seed"
-FOLDER = "Folder (empty: date and time)"
-MORE_SETTINGS, MORE_LABEL = "More settings", "Settings as TOML"
-MORE_HINT = "A line for each, such as ppo.learning_rate = 1e-3. They count more than the fields above."
-USUAL = "as usual: {value}"
-ASK_LABEL = "You are asked"
-ASK = {"always": "before every round", "unsure": "only when in doubt"}
-QUESTION_LABEL = "You are asked for"
-QUESTION = {
-    "front": "the best of the whole front",
-    "few": "the best of a few policies",
-    "pair": "the better one of a pair",
-    "rank": "an order of a few policies",
-}
 
 
 def phase(view: View, now: float, leaving: bool = False) -> str:
@@ -211,24 +92,24 @@ def heading(view: View, selection: Selection) -> str:
         purpose, generation, form, again = question.purpose, question.generation, question.form, question.again
         asked = questions.front_question(purpose, generation, len(question.front), form, again)
         if view.timeline is not None and view.timeline.left == 1 and purpose == "steer":
-            asked = f"{asked} {LAST_ROUND}"
-        return asked if reaching(view, selection).any() else f"{asked} {NONE_REACHES}"
+            asked = f"{asked} {words.LAST_ROUND}"
+        return asked if reaching(view, selection).any() else f"{asked} {words.NONE_REACHES}"
     if view.result:
         values = minus(values_in_words(view.result.values, writers_of(view)))
         return f"The result is {policy_name(view, view.result.id, SHORT)}: {values}"
     if view.problem:
-        then = GOING_ON_FAILS if view.for_good else PUT_RIGHT
-        return f"Training has stopped: {view.problem.rstrip('.')}. {KEPT} {then}"
+        then = words.GOING_ON_FAILS if view.for_good else words.PUT_RIGHT
+        return f"Training has stopped: {view.problem.rstrip('.')}. {words.KEPT} {then}"
     if view.timeline is None:
         return "Look around, step back in the history, or go on with this run."
     if not view.generations:
-        return EARLY if view.early else WARM_UP
+        return words.EARLY if view.early else words.WARM_UP
     if view.config.user != PERSON:
         return f"User {view.config.user} decides; you watch."
     if view.rounds_to_question is None:
         return "You are asked once, at the end."
     if view.asking == "end":
-        return END_LATER
+        return words.END_LATER
     if view.stand_in and view.previous:
         name = policy_name(view, view.previous.id, SHORT)
         return f"{name[0].upper()}{name[1:]} was chosen for you: {view.stand_in}."
@@ -240,7 +121,7 @@ def heading(view: View, selection: Selection) -> str:
 
 def lost(folder: Path) -> str:
     """Say that the studio is gone, and what to do."""
-    return LOST.format(command=printable(command("studio", folder)))
+    return words.LOST.format(command=printable(command("studio", folder)))
 
 
 def policy_name(view: View, policy_id: int, longest: int = LONGEST_NAME) -> str:
@@ -263,12 +144,7 @@ def remarks(view: View, policy: Policy) -> str:
 
 def watched(objectives: Sequence[Objective]) -> str:
     """Say to somebody new who only watches what happens here."""
-    return WATCHED.format(objectives=questions.joined([objective.label for objective in objectives]))
-
-
-def objectives(labels: Sequence[str]) -> str:
-    """Say what an environment has for objectives."""
-    return f"Its objectives are {questions.joined(labels)}."
+    return words.WATCHED.format(objectives=questions.joined([objective.label for objective in objectives]))
 
 
 def ranges(view: View) -> list[str]:
@@ -407,9 +283,9 @@ def _with_units(view: View, values: np.ndarray, deviations: np.ndarray) -> list[
 def remark(view: View, policy: Policy) -> str:
     """Say where a policy comes from, that it cannot be chosen, or how far its scores can be trusted as the result's."""
     if view.question and not view.choosable(policy.id):
-        return f"{REPLACED}, so it cannot be chosen"
+        return f"{words.REPLACED}, so it cannot be chosen"
     if policy.id in view.replaced:
-        return REPLACED
+        return words.REPLACED
     if view.result or (view.question and view.question.purpose == "final"):
         return _certainty(view, policy)
     if view.early:
@@ -438,53 +314,6 @@ def _certainty(view: View, policy: Policy) -> str:
 def opened_elsewhere(view: View) -> str:
     """Say that another run was opened than the one that was shown."""
     return f"{printable(view.path.name)} was opened, in another tab."
-
-
-def open_run(view: View | None, opening: str, now: float) -> str:
-    """Say which run is open and what is going on, or which one is about to be opened, and what that waits for."""
-    if opening:
-        waits = view is not None and view.timeline is not None and view.question is None
-        after = f", as soon as this round of {printable(view.path.name)} is over" if view and waits else ""
-        return f"Opening {opening}{after} …"
-    return f"Open: {printable(view.path.name)}. {phase(view, now)}." if view else ""
-
-
-def decider(facts: Facts) -> str:
-    """Say how a run searches, and who decides."""
-    return f"{facts.method}, {'you decide' if facts.user == PERSON else f'user {facts.user}'}"
-
-
-def progress(facts: Facts) -> str:
-    """Say how many rounds of a run are over."""
-    return "in the warm-up" if facts.rounds is None else plural(facts.rounds, "round")
-
-
-def budget(facts: Facts) -> str:
-    """Say how much of its budget a run has used."""
-    return f"{short_count(facts.steps)} of {short_count(facts.budget)} steps"
-
-
-def branch_of(origin: Origin | None) -> str:
-    """Say where a branch leaves another run; nothing of a run that is no branch."""
-    if origin is None:
-        return ""
-    return f"branch of {origin.name} after {f'round {origin.generation}' if origin.generation else 'its warm-up'}"
-
-
-def result(facts: Facts) -> str:
-    """Return the scores of a run's result, as people say them; nothing before the end."""
-    read = {objective.name: objective for objective in _known_objectives(facts.env)}
-    told = [
-        f"{read[name].label} {number(float(read[name].read.of(value)))}" if name in read else f"{name} {number(value)}"
-        for name, value in facts.scores
-    ]
-    return minus(", ".join(told))
-
-
-@lru_cache
-def _known_objectives(env: str) -> tuple[Objective, ...]:
-    """Return the objectives of an environment of jmorl's own; nothing of any other, which a list does not import."""
-    return envs.make(env).objectives if envs.plain_id(env) == env and env in envs.ids() else ()
 
 
 def _generation(timeline: Timeline) -> int:

@@ -6,14 +6,14 @@ import inspect
 import pytest
 
 from jmorl.decision.answers import Answer, Choose
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.access import Access
 from jmorl.studio.home import Home
 from jmorl.studio.home_tab import HomeTab
 from jmorl.studio.tab import Editing, Ending, Tab
 
 WATCHES = Access(watching=True)
-REFUSED = ("hint", texts.ONLY_WATCHING)
+REFUSED = ("hint", words.ONLY_WATCHING)
 READ = {
     *("view", "dialogue", "prospects", "clock", "leaving", "opening", "is_open", "held_folders", "open_folder"),
     *("history", "fronts", "score_between", "work_out"),
@@ -100,7 +100,7 @@ def test_a_tab_that_watches_refuses_each_command_that_steers_and_does_the_others
         "compare_with": (run, True),
         "stop_comparing": (),
         "turn_axes": ((1, 0),),
-        "turn_to": (texts.HISTORY,),
+        "turn_to": (words.HISTORY,),
     }
     assert {*steering, *looking} == commands(Tab) and not {*steering} & {*looking}
     tab.ending = Ending(question, (first,))  # as if there were a way to either
@@ -115,7 +115,7 @@ def test_a_tab_that_watches_refuses_each_command_that_steers_and_does_the_others
     assert REFUSED not in said and only_read.wanted == []
     assert session.view.question is question and session.dialogue is dialogue
     assert not [*session.view.path.glob("decisions.jsonl"), *session.view.path.glob("notes.json")]
-    assert tab.axes == (1, 0) and tab.side == texts.HISTORY
+    assert tab.axes == (1, 0) and tab.side == words.HISTORY
 
 
 def test_a_home_page_that_watches_lists_runs_and_opens_and_begins_none(session, question):

@@ -7,7 +7,7 @@ import pytest
 
 from jmorl.config import Config, ConfigError, resolve
 from jmorl.presets import PRESETS
-from jmorl.studio import texts
+from jmorl.studio import words
 from jmorl.studio.form import Form, environments
 from tests.registered import ThreeWays
 
@@ -123,5 +123,5 @@ def test_the_environments_are_those_that_any_process_knows_and_the_one_that_is_o
 
 def test_every_way_of_asking_has_words():
     fields = Config.model_fields
-    assert set(texts.ASK) == set(fields["ask"].annotation.__args__)
-    assert set(texts.QUESTION) == set(fields["question"].annotation.__args__)
+    assert set(words.ASK) == set(fields["ask"].annotation.__args__)
+    assert set(words.QUESTION) == set(fields["question"].annotation.__args__)

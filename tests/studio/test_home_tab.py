@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from jmorl.storage.resume import branch
-from jmorl.studio import texts
+from jmorl.studio import home_texts
 from jmorl.studio.home import Home
 from jmorl.studio.home_tab import HomeTab
 from tests.studio.test_form import RIGHT
@@ -69,7 +69,8 @@ def test_a_run_of_the_list_is_opened_and_gone_to(nothing_open, watching):
     asyncio.run(watching.tab.open("yours"))
     assert nothing_open.question().generation == 3 and watching.gone == 1 and not watching.said
     assert (
-        texts.open_run(nothing_open.view, "", 0.0) == "Open: yours. Waiting for your answer: question 3 of at most 4."
+        home_texts.open_run(nothing_open.view, "", 0.0)
+        == "Open: yours. Waiting for your answer: question 3 of at most 4."
     )
     asyncio.run(watching.tab.follow())
     assert watching.tab.runs[0].state == "interrupted"  # its lock is this session's own
@@ -96,10 +97,10 @@ def test_what_opening_waits_for_is_told(nothing_open, watching):
     asyncio.run(watching.tab.open("yours"))
     nothing_open.question()
     view = nothing_open.view
-    assert texts.open_run(view, "ended", 0.0) == "Opening ended …"
+    assert home_texts.open_run(view, "ended", 0.0) == "Opening ended …"
     training = replace(view, question=None)
-    assert texts.open_run(training, "ended", 0.0) == "Opening ended, as soon as this round of yours is over …"
-    assert texts.open_run(None, "ended", 0.0) == "Opening ended …" and texts.open_run(None, "", 0.0) == ""
+    assert home_texts.open_run(training, "ended", 0.0) == "Opening ended, as soon as this round of yours is over …"
+    assert home_texts.open_run(None, "ended", 0.0) == "Opening ended …" and home_texts.open_run(None, "", 0.0) == ""
 
 
 def test_a_new_run_is_begun_and_gone_to(nothing_open, watching, runs):
@@ -140,8 +141,8 @@ def test_the_form_outlives_a_reload(nothing_open, runs):
 
 def test_what_is_listed_is_told_in_words(watching):
     yours, ended = (run.facts for run in watching.tab.runs)
-    assert texts.decider(yours) == "interactive, you decide"
-    assert texts.decider(ended) == "interactive, user weights=0.5,0.3,0.2"
-    assert (texts.progress(yours), texts.budget(ended)) == ("2 rounds", "2.11 k of 2.11 k steps")
-    assert texts.branch_of(yours.origin) == "branch of ended after round 2" and texts.branch_of(None) == ""
-    assert texts.result(yours) == "" and texts.result(ended).startswith("north −")
+    assert home_texts.decider(yours) == "interactive, you decide"
+    assert home_texts.decider(ended) == "interactive, user weights=0.5,0.3,0.2"
+    assert (home_texts.progress(yours), home_texts.budget(ended)) == ("2 rounds", "2.11 k of 2.11 k steps")
+    assert home_texts.branch_of(yours.origin) == "branch of ended after round 2" and home_texts.branch_of(None) == ""
+    assert home_texts.result(yours) == "" and home_texts.result(ended).startswith("north −")

@@ -12,7 +12,7 @@ import envs
 from jmorl.decision.answers import Answer, Choose
 from jmorl.storage.resume import Continued
 from jmorl.storage.run_folder import RunFolder
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.selection import last_choice, listed
 from jmorl.studio.tab import Tab
 from jmorl.studio.view import stored_view
@@ -347,15 +347,15 @@ def test_what_is_new_is_shown(watching):
     commands = [
         tab.follow,
         lambda: tab.turn_axes((1, 2)),
-        lambda: tab.turn_to(texts.HISTORY),
+        lambda: tab.turn_to(words.HISTORY),
         lambda: tab.look_at(tab.view.front[0].id),
         lambda: tab.put_away(tab.view.front[0].id),
     ]
     for count, command in enumerate(commands, start=1):
         command()
         assert watching.shown == count
-    tab.turn_to(texts.HISTORY)  # is open
-    assert watching.shown == len(commands) and (tab.axes, tab.side) == ((1, 2), texts.HISTORY)
+    tab.turn_to(words.HISTORY)  # is open
+    assert watching.shown == len(commands) and (tab.axes, tab.side) == ((1, 2), words.HISTORY)
 
 
 def test_a_policy_that_has_gone_says_so(watching):
@@ -522,7 +522,7 @@ def test_favourites_are_listed_those_that_were_replaced_too(session, question, w
     tab.list_favourites(False)
     assert listed(tab.view, tab.selection) is None
     ended = replace(tab.view, question=None)
-    assert texts.remark(ended, shown) == texts.REPLACED and texts.remark(ended, left[0]) == "trained in the warm-up"
+    assert texts.remark(ended, shown) == words.REPLACED and texts.remark(ended, left[0]) == "trained in the warm-up"
 
 
 def test_damaged_notes_are_told_of_and_the_page_goes_on(session, question, watching):
@@ -551,7 +551,7 @@ def test_damaged_notes_are_told_of_and_the_page_goes_on(session, question, watch
 def test_branches_are_named_and_compared(session, question, watching):
     tab, run = watching.tab, watching.tab.view.run
     asyncio.run(tab.compare())
-    assert watching.tab.comparison is None and watching.said == [("hint", texts.NOTHING_TO_COMPARE)]
+    assert watching.tab.comparison is None and watching.said == [("hint", words.NOTHING_TO_COMPARE)]
     watching.said.clear()
     tab.choose(order(question.front, 0)[-1])
     session.question()

@@ -3,7 +3,7 @@
 from nicegui import background_tasks, ui
 from nicegui.events import GenericEventArguments
 
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.between import BEYOND
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.panels.player import Player
@@ -21,7 +21,7 @@ class BetweenPanel:
         self.place: tuple[str, int, int] | None = None  # run and policies of the dial
         self.per_cent = 50
         with ui.element("div").classes("between"):
-            self.hint = ui.label(texts.BETWEEN_HINT).classes("explanation")
+            self.hint = ui.label(words.BETWEEN_HINT).classes("explanation")
             with ui.element("div").classes("dial") as self.dial:
                 with ui.element("div").classes("card-head"):
                     self.heading = ui.label().classes("card-title")
@@ -49,7 +49,7 @@ class BetweenPanel:
         tab = self.tab
         if not self.shown.is_new(tab.view, tab.selection, tab.side):
             return
-        pair = tab.pair if tab.side == texts.BETWEEN else None
+        pair = tab.pair if tab.side == words.BETWEEN else None
         self.hint.set_visibility(pair is None)
         self.dial.set_visibility(pair is not None)
         place = (tab.view.run, *pair) if pair else None
@@ -79,7 +79,7 @@ class BetweenPanel:
         self.player.props["decimals"] = [min(places if places is not None else 2, 4) for places in digits]
         self.player.props["label"] = "the blend at work"
         self.player.update()
-        self.scores.set_text(texts.SCORING)
+        self.scores.set_text(words.SCORING)
         background_tasks.create(self.show_scores())
 
     def _name(self) -> None:

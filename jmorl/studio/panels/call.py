@@ -2,7 +2,7 @@
 
 from nicegui.element import Element
 
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -18,7 +18,7 @@ class Call:
         self.tab = tab
         self.shown = Shown()
         self.bell = Bell()
-        self.bell.props["label"], self.bell.props["hint"] = texts.CALL, texts.CALL_HINT
+        self.bell.props["label"], self.bell.props["hint"] = words.CALL, words.CALL_HINT
 
     def show(self) -> None:
         """Name the question that is open."""

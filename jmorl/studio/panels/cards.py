@@ -3,7 +3,7 @@
 from nicegui import ui
 
 from jmorl.search.policy import Policy
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.panels.player import Player
 from jmorl.studio.selection import LETTERS
@@ -20,7 +20,7 @@ class Cards:
         with ui.element("section").classes("panel behaviour").props('aria-label="Behaviour"'):
             controls = Player()
             controls.props["controls"] = True
-            self.hint = ui.label("Click a policy in a chart or in the table to see what it does.").classes("hint")
+            self.hint = ui.label(words.LOOK_HINT).classes("hint")
             with ui.element("div").classes("cards"):
                 self.places = {letter: ui.element("article").classes("place") for letter in LETTERS}
 

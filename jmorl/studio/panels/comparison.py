@@ -2,7 +2,7 @@
 
 from nicegui import background_tasks, ui
 
-from jmorl.studio import texts
+from jmorl.studio import words
 from jmorl.studio.charts.comparison_chart import comparison_options
 from jmorl.studio.comparison import BranchFront
 from jmorl.studio.panels.drawing import draw
@@ -16,14 +16,14 @@ class ComparisonDialog:
     def __init__(self, tab: Tab):
         self.tab = tab
         self.seen, self.read, self.offered = Shown(), Shown(), Shown()
-        dialog = ui.dialog().props(f'aria-label="{texts.COMPARED}"')
+        dialog = ui.dialog().props(f'aria-label="{words.COMPARED}"')
         with dialog.bind_value_to(tab, "covered") as self.dialog, ui.card().classes("comparison"):
             with ui.element("div").classes("comparison-head"):
-                ui.label(texts.COMPARED).classes("title")
-                ui.button("Close", on_click=tab.stop_comparing).props("flat no-caps")
+                ui.label(words.COMPARED).classes("title")
+                ui.button(words.CLOSE, on_click=tab.stop_comparing).props("flat no-caps")
             self.branches = ui.element("div").classes("comparison-branches")
             self.chart = ui.echart({})
-            ui.label(texts.COMPARE_HINT).classes("explanation")
+            ui.label(words.COMPARE_HINT).classes("explanation")
             self.problems = ui.label().classes("explanation")
         self.dialog.on_value_change(self._closed)
 

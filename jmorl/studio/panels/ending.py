@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Ending, Tab
 
@@ -14,10 +14,10 @@ class EndingDialog:
         self.tab = tab
         self.shown = Shown()
         with ui.dialog().props('aria-label="End the run?"') as self.dialog, ui.card():
-            ui.label(texts.END_TITLE).classes("title")
+            ui.label(words.END_TITLE).classes("title")
             self.text = ui.label().classes("explanation")
             self.buttons = ui.element("div").classes("endings")
-            ui.button("Not yet", on_click=self.dialog.close).props("flat no-caps")
+            ui.button(words.NOT_YET, on_click=self.dialog.close).props("flat no-caps")
         self.dialog.on_value_change(self._closed)
 
     def show(self) -> None:
@@ -34,7 +34,7 @@ class EndingDialog:
 
     def _offer(self, ending: Ending) -> None:
         view, selection = self.tab.view, self.tab.selection
-        self.text.set_text(texts.END_EXPLANATION if ending.question else f"{texts.END_LATER} {texts.END_EXPLANATION}")
+        self.text.set_text(words.END_EXPLANATION if ending.question else f"{words.END_LATER} {words.END_EXPLANATION}")
         self.buttons.clear()
         with self.buttons:
             for policy in filter(None, map(view.policy, ending.policies)):

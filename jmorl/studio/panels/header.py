@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.home import printable
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
@@ -19,14 +19,14 @@ class Header:
         self.next_tick = 0.0  # on the session's clock
         with ui.element("h1").classes("brand"):
             ui.label("jmorl studio")
-        ui.link(texts.ALL_RUNS, "/runs").classes("all-runs")
+        ui.link(words.ALL_RUNS, "/runs").classes("all-runs")
         self.run_name = ui.label().classes("run-name")
         self.phase = ui.label().classes("phase").props('role="status"')
         with ui.element("div").classes("meter").props('role="progressbar" aria-label="Budget used"'):
             self.meter = ui.element("div")
         self.facts = ui.label().classes("facts")
         if tab.access.watching:
-            ui.label(texts.WATCHING).classes("watching").tooltip(texts.WATCHING_HINT)
+            ui.label(words.WATCHING).classes("watching").tooltip(words.WATCHING_HINT)
 
     def show(self) -> None:
         """Show a new view at once, and otherwise, once a second, what changes with time alone."""

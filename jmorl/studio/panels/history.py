@@ -7,7 +7,7 @@ from nicegui import ui
 from jmorl.decision.records import DecisionRecord
 from jmorl.display.readings import values_in_words
 from jmorl.display.text import plural
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.history import Branch
 from jmorl.studio.home import printable
 from jmorl.studio.panels.panel import Shown
@@ -25,7 +25,7 @@ class HistoryPanel:
         self.seen = Shown()
         self.content: tuple[tuple[Branch, ...], str, str] | None = None  # shown: branches, open run, open question
         with ui.element("div").classes("history"):
-            self.compare = ui.button(texts.COMPARE, on_click=tab.compare).props("no-caps dense outline size=sm")
+            self.compare = ui.button(words.COMPARE, on_click=tab.compare).props("no-caps dense outline size=sm")
             self.compare.classes("compare")
             self.tree = ui.element("div").props('role="tree" aria-label="History"')
 
@@ -58,7 +58,7 @@ class HistoryPanel:
                     )
                 ui.label(_state(branch, is_open)).classes("branch-state")
                 if not is_open and not self.tab.access.watching:
-                    open_it = ui.button("Open", on_click=lambda: self.tab.switch(branch.run))
+                    open_it = ui.button(words.OPEN, on_click=lambda: self.tab.switch(branch.run))
                     open_it.props("no-caps dense outline size=sm")
             if branch.noted.run.text or branch.noted.problem:
                 ui.label(branch.noted.run.text or branch.noted.problem).classes("note")
@@ -89,7 +89,7 @@ class HistoryPanel:
 
     def _add_way_back(self, branch: Branch, generation: int) -> None:
         if generation - 1 in branch.checkpoints and not self.tab.access.watching:
-            back = ui.button("Choose otherwise", on_click=lambda: self.tab.step_back(branch.run, generation))
+            back = ui.button(words.CHOOSE_OTHERWISE, on_click=lambda: self.tab.step_back(branch.run, generation))
             back.props("no-caps dense flat size=sm")
 
     def _values(self, values: Sequence[float]) -> str:

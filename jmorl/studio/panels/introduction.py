@@ -3,7 +3,7 @@
 from nicegui import ui
 
 from jmorl.display.questions import introduction
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.tab import Tab
 
 # The browser remembers who has read them; the page then never shows them, not even for a moment.
@@ -22,7 +22,7 @@ class Introduction:
         with ui.element("section").classes("bar introduction").props('aria-label="Introduction"'):
             watching, objectives = tab.access.watching, tab.view.objectives
             ui.label(texts.watched(objectives) if watching else introduction(objectives))
-            ui.button("Got it").props("no-caps dense flat").on("click", js_handler=REMEMBER)
+            ui.button(words.GOT_IT).props("no-caps dense flat").on("click", js_handler=REMEMBER)
 
     def show(self) -> None:
         """Do nothing: it does not change."""

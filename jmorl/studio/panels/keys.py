@@ -4,7 +4,7 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from jmorl.display.readings import reading_label
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.tab import Tab
 
 STEERING = ("=", "c", "f", "k")  # keys of commands that steer
@@ -17,9 +17,9 @@ class Keys:
         self.tab = tab
         ui.keyboard(self._press, ignore=["input", "select", "textarea"], repeating=True)
         with ui.dialog().props('aria-label="Keys"').bind_value_to(tab, "covered") as self.list, ui.card():
-            ui.label("Keys").classes("title")
+            ui.label(words.KEY_LIST).classes("title")
             with ui.element("dl").classes("keys"):
-                for key, what in texts.KEYS:
+                for key, what in words.KEYS:
                     if tab.access.watching and key in STEERING:
                         continue
                     with ui.element("dt"):
@@ -28,8 +28,8 @@ class Keys:
                         ui.label(what)
             for number, objective in enumerate(tab.view.objectives, start=1):
                 ui.label(f"{number}: {reading_label(objective)}")
-            ui.button("Close", on_click=self.list.close).props("flat no-caps")
-        ui.button("Keys", on_click=self.list.open).props("flat dense no-caps size=sm")
+            ui.button(words.CLOSE, on_click=self.list.close).props("flat no-caps")
+        ui.button(words.KEY_LIST, on_click=self.list.open).props("flat dense no-caps size=sm")
 
     async def _press(self, event: KeyEventArguments) -> None:
         modified = event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta

@@ -5,7 +5,7 @@ import math
 from nicegui import ui
 
 from jmorl.display.readings import reading_label
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -30,7 +30,7 @@ class LimitsPanel:
         if not self.shown.is_new(view, selection):
             return
         later = view.result or self.tab.access.watching
-        self.hint.set_text(texts.LIMITS_LATER if later else texts.LIMITS_HINT)
+        self.hint.set_text(words.LIMITS_LATER if later else words.LIMITS_HINT)
         limits = selection.limits or (-math.inf,) * len(view.objectives)
         self.showing = True
         for number, objective, least in zip(self.numbers, view.objectives, limits, strict=True):
@@ -49,7 +49,7 @@ class LimitsPanel:
         ui.label(name)
         number = ui.input(
             on_change=lambda event: self._set(index, event.value),
-            validation=lambda text: texts.NO_NUMBER if math.isnan(_number(text) or 0.0) else None,
+            validation=lambda text: words.NO_NUMBER if math.isnan(_number(text) or 0.0) else None,
         ).classes("limit")
         number.props(
             'dense outlined clearable hide-bottom-space debounce=400 inputmode=decimal placeholder="anything"'

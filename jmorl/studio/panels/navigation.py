@@ -8,7 +8,7 @@ from jmorl.decision.protocol import PointQuestion
 from jmorl.display.readings import reading_label
 from jmorl.display.text import plural
 from jmorl.search.scaling import range_scale
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.dialogue import Dialogue
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
@@ -35,7 +35,7 @@ class NavigationPanel:
         self.body.clear()
         with self.body:
             if dialogue is None and self.tab.access.watching:
-                ui.label(texts.NO_DIALOGUE).classes("explanation")
+                ui.label(words.NO_DIALOGUE).classes("explanation")
             elif dialogue is None:
                 self._add_beginning()
             elif dialogue.chosen:
@@ -51,7 +51,7 @@ class NavigationPanel:
         with ui.element("div").classes("controls"):
             iterations = _number("iterations", ITERATIONS)
             points = _number("points in each", POINTS)
-            begin = ui.button("Begin", on_click=lambda: self._begin(iterations, points))
+            begin = ui.button(words.BEGIN, on_click=lambda: self._begin(iterations, points))
             begin.props("no-caps dense color=primary")
 
     def _add_question(self, dialogue: Dialogue, question: PointQuestion) -> None:
@@ -68,12 +68,12 @@ class NavigationPanel:
         with ui.element("div").classes("controls"):
             iterations = _number("iterations left", state.iterations_left)
             points = _number("points in each", state.points)
-            change = ui.button("Change", on_click=lambda: self._adjust(dialogue, iterations, points))
+            change = ui.button(words.CHANGE, on_click=lambda: self._adjust(dialogue, iterations, points))
             change.props("no-caps dense outline")
-            back = ui.button("Step back", on_click=lambda: self.tab.reply(dialogue, Back(1)))
+            back = ui.button(words.STEP_BACK, on_click=lambda: self.tab.reply(dialogue, Back(1)))
             back.props("no-caps dense outline")
             back.set_enabled(state.choices > 0)
-            ui.button("Close", on_click=self.tab.close_dialogue).props("no-caps dense flat")
+            ui.button(words.CLOSE, on_click=self.tab.close_dialogue).props("no-caps dense flat")
 
     def _add_point(self, dialogue: Dialogue, question: PointQuestion, number: int, point: IntermediatePoint) -> None:
         scale, writers = range_scale(question.state.values), texts.writers_of(self.tab.view)
@@ -91,7 +91,7 @@ class NavigationPanel:
                 ui.label(f"{point.closeness:.0f} % of the way")
                 ui.label(f"{plural(int(point.reachable.sum()), 'policy')} left")
             if not self.tab.access.watching:
-                choose = ui.button("Prefer", on_click=lambda: self.tab.reply(dialogue, Choose(number - 1)))
+                choose = ui.button(words.PREFER, on_click=lambda: self.tab.reply(dialogue, Choose(number - 1)))
                 choose.props("no-caps dense outline")
 
     def _add_end(self, dialogue: Dialogue) -> None:
@@ -99,15 +99,15 @@ class NavigationPanel:
         assert chosen
         ui.label(f"E-NAUTILUS ends on policy {chosen.id}: {texts.scores(self.tab.view, chosen)}.").classes("ending")
         if self.tab.view.choosable(chosen.id) and not self.tab.access.watching:
-            ui.label("It is laid out below, where you can choose it.").classes("explanation")
+            ui.label(words.LAID_OUT_BELOW).classes("explanation")
         with ui.element("div").classes("controls"):
-            look = ui.button("Look at it", on_click=lambda: self.tab.look_at(chosen.id))
+            look = ui.button(words.LOOK_AT_IT, on_click=lambda: self.tab.look_at(chosen.id))
             look.props("no-caps dense color=primary")
             if self.tab.access.watching:
                 return
-            undo = ui.button("Step back", on_click=self.tab.undo_reply).props("no-caps dense outline")
+            undo = ui.button(words.STEP_BACK, on_click=self.tab.undo_reply).props("no-caps dense outline")
             undo.set_enabled(dialogue.before is not None)
-            ui.button("Begin again", on_click=self.tab.close_dialogue).props("no-caps dense flat")
+            ui.button(words.BEGIN_AGAIN, on_click=self.tab.close_dialogue).props("no-caps dense flat")
 
     async def _begin(self, iterations: ui.number, points: ui.number) -> None:
         await self.tab.begin_dialogue(_whole(iterations), _whole(points))

@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -16,12 +16,12 @@ class NoteDialog:
         dialog = ui.dialog().props('aria-label="Name and note"')
         with dialog.bind_value_to(tab, "covered") as self.dialog, ui.card().classes("note-card"):
             self.subject = ui.label().classes("title")
-            self.name = ui.input(texts.NAME).props("outlined dense counter autofocus").on("keydown.enter", self._save)
-            self.text = ui.textarea(texts.NOTE).props("outlined dense counter")
-            ui.label(texts.NOTE_HINT).classes("explanation")
+            self.name = ui.input(words.NAME).props("outlined dense counter autofocus").on("keydown.enter", self._save)
+            self.text = ui.textarea(words.NOTE).props("outlined dense counter")
+            ui.label(words.NOTE_HINT).classes("explanation")
             with ui.element("div").classes("buttons"):
-                ui.button("Save", on_click=self._save).props("no-caps color=primary")
-                ui.button("Cancel", on_click=tab.stop_editing).props("flat no-caps")
+                ui.button(words.SAVE, on_click=self._save).props("no-caps color=primary")
+                ui.button(words.CANCEL, on_click=tab.stop_editing).props("flat no-caps")
         self.dialog.on_value_change(self._closed)
 
     def show(self) -> None:

@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from jmorl.studio import texts
+from jmorl.studio import words
 from jmorl.studio.charts.curves import curve_options
 from jmorl.studio.panels.drawing import draw
 from jmorl.studio.panels.panel import Shown
@@ -16,7 +16,7 @@ class ProgressPanel:
         self.tab = tab
         self.drawn = Shown()
         with ui.element("div").classes("curves"):
-            ui.label(texts.PROGRESS_HINT).classes("explanation")
+            ui.label(words.PROGRESS_HINT).classes("explanation")
             self.curves = ui.echart({})
 
     def show(self) -> None:

@@ -4,7 +4,7 @@ from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
 from jmorl.report.journey import how_to
-from jmorl.studio import texts
+from jmorl.studio import texts, words
 from jmorl.studio.panels.panel import Shown
 from jmorl.studio.tab import Tab
 
@@ -23,9 +23,9 @@ class QuestionBar:
             self.buttons = ui.element("div").classes("buttons")
         dialog = ui.dialog().props('aria-label="How to use the policy"')
         with dialog.bind_value_to(tab, "covered") as self.how_to, ui.card():
-            ui.label(texts.HOW_TO)
+            ui.label(words.HOW_TO)
             self.lines = ui.element("pre").classes("lines-of-python")
-            ui.button("Close", on_click=self.how_to.close).props("flat no-caps")
+            ui.button(words.CLOSE, on_click=self.how_to.close).props("flat no-caps")
 
     def show(self) -> None:
         """Show what is asked; replace the buttons only where others are due: somebody may be about to press one."""
@@ -46,18 +46,18 @@ class QuestionBar:
             if view.front:
                 self._add_more()
             if self.tab.access.watching and not view.result:
-                ui.label(texts.OTHERS_ANSWER).classes("explanation")
+                ui.label(words.OTHERS_ANSWER).classes("explanation")
             elif view.question:
                 self._add_answers()
             elif view.result:
                 self._add_result()
             elif view.timeline is None and not view.for_good:
-                ui.button("Go on with this run", on_click=self._go_on).props("no-caps dense color=primary")
+                ui.button(words.GO_ON, on_click=self._go_on).props("no-caps dense color=primary")
             elif view.timeline and view.generations:
                 self._add_interruptions()
 
     def _add_more(self) -> None:
-        ui.label("Better in")
+        ui.label(words.BETTER_IN)
         for index, objective in enumerate(self.tab.view.objectives):
             pressed = self.tab.selection.more_of == index
             button = ui.button(objective.label, on_click=lambda index=index: self.tab.more_of(index))
@@ -69,51 +69,53 @@ class QuestionBar:
         assert view.question
         keep = texts.keep(view)
         if keep:
-            ui.button(keep, on_click=self.tab.keep).props("no-caps dense outline").tooltip(texts.KEEP_HINT)
+            ui.button(keep, on_click=self.tab.keep).props("no-caps dense outline").tooltip(words.KEEP_HINT)
         left = view.timeline.left if view.timeline else 1
         if texts.offers_equal(view):
-            ui.button("No difference", on_click=self.tab.say_equal).props("no-caps dense outline")
+            ui.button(words.NO_DIFFERENCE, on_click=self.tab.say_equal).props("no-caps dense outline")
         if view.question.purpose != "steer":
             return
         if texts.offers_pair(view):
-            pair = ui.button(texts.COMPARE_TWO, on_click=self.tab.ask_pair).props("no-caps dense outline")
-            pair.tooltip(texts.COMPARE_TWO_HINT)
+            pair = ui.button(words.COMPARE_TWO, on_click=self.tab.ask_pair).props("no-caps dense outline")
+            pair.tooltip(words.COMPARE_TWO_HINT)
         if not view.question.again:
-            ui.button(texts.SKIP, on_click=self.tab.skip).props("no-caps dense outline").tooltip(texts.SKIP_HINT)
+            ui.button(words.SKIP, on_click=self.tab.skip).props("no-caps dense outline").tooltip(words.SKIP_HINT)
         if left > 1:
-            ui.label("then go on for")
+            ui.label(words.THEN_GO_ON_FOR)
             number = ui.number(value=self.tab.generations, min=1, max=left, format="%d", on_change=self._go_on_for)
             number.props('dense outlined aria-label="rounds before the next question"').classes("count")
             ui.label(f"of {left} rounds")
-        ui.button("Stop here", on_click=self.tab.stop).props("no-caps dense outline color=negative")
+        ui.button(words.STOP_HERE, on_click=self.tab.stop).props("no-caps dense outline color=negative")
 
     def _add_interruptions(self) -> None:
         view = self.tab.view
         rounds = view.rounds_to_question
         if rounds is not None and not view.asking and (rounds > 1 or view.config.ask == "unsure"):
-            ask = ui.button("Ask me after this round", on_click=self.tab.ask_now).props("no-caps dense outline")
-            ask.tooltip(texts.ASK_NOW_HINT)
+            ask = ui.button(words.ASK_NOW, on_click=self.tab.ask_now).props("no-caps dense outline")
+            ask.tooltip(words.ASK_NOW_HINT)
         if view.stand_in:
-            back = ui.button("Choose otherwise", on_click=self._take_back).props("no-caps dense outline")
-            back.tooltip(texts.TAKE_BACK_HINT)
-        ui.button("Pause training", on_click=self.tab.pause).props("no-caps dense outline").tooltip(texts.PAUSE_HINT)
+            back = ui.button(words.CHOOSE_OTHERWISE, on_click=self._take_back).props("no-caps dense outline")
+            back.tooltip(words.TAKE_BACK_HINT)
+        ui.button(words.PAUSE, on_click=self.tab.pause).props("no-caps dense outline").tooltip(words.PAUSE_HINT)
         if view.previous and rounds is not None and view.asking != "end":
-            ui.button("Stop here", on_click=self.tab.stop).props("no-caps dense outline color=negative")
+            ui.button(words.STOP_HERE, on_click=self.tab.stop).props("no-caps dense outline color=negative")
 
     def _add_result(self) -> None:
         view = self.tab.view
         assert view.result
-        ui.button("Save the policy file", on_click=self._save).props("no-caps dense color=primary")
-        with ui.dropdown_button("Save more", auto_close=True).props("no-caps dense outline"):
-            for what, address in texts.MORE_FILES.items():
+        ui.button(words.SAVE_POLICY, on_click=self._save).props("no-caps dense color=primary")
+        with ui.dropdown_button(words.SAVE_MORE, auto_close=True).props("no-caps dense outline"):
+            for what, address in words.MORE_FILES.items():
                 ui.item(what, on_click=lambda address=address: ui.download(address.format(run=view.run)))
-        ui.button("How it came about", on_click=lambda: self.tab.turn_to(texts.HISTORY)).props("no-caps dense outline")
+        ui.button(words.HOW_IT_CAME_ABOUT, on_click=lambda: self.tab.turn_to(words.HISTORY)).props(
+            "no-caps dense outline"
+        )
         if self.tab.access.watching:
             return
-        ui.button("Train on for", on_click=self._train_on).props("no-caps dense outline").tooltip(texts.TRAIN_ON_HINT)
+        ui.button(words.TRAIN_ON, on_click=self._train_on).props("no-caps dense outline").tooltip(words.TRAIN_ON_HINT)
         number = ui.number(value=self.rounds, min=1, max=1000, format="%d", on_change=self._set_rounds)
         number.props('dense outlined aria-label="rounds to train on for"').classes("count")
-        ui.label("rounds")
+        ui.label(words.ROUNDS)
 
     async def _take_back(self) -> None:
         view = self.tab.view

@@ -7,7 +7,7 @@ from nicegui.events import ValueChangeEventArguments
 
 from jmorl.display.text import short_count
 from jmorl.presets import PRESETS
-from jmorl.studio import texts
+from jmorl.studio import home_texts, words
 from jmorl.studio.home_tab import HomeTab
 from jmorl.studio.panels.panel import Shown
 
@@ -22,23 +22,23 @@ class RunForm:
         self.usual, self.state = Shown(), Shown()
         with ui.element("section").classes("panel run-form").props('id="new-run" aria-label="New run"'):
             with ui.element("h2").classes("title"):
-                ui.label(texts.NEW_RUN)
-            self._add_select("env", texts.ENVIRONMENT, {id: id for id in tab.environments})
+                ui.label(words.NEW_RUN)
+            self._add_select("env", words.ENVIRONMENT, {id: id for id in tab.environments})
             self.objectives = ui.label().classes("explanation")
-            self._add_select("preset", texts.PRESET, {name: name for name in PRESETS})
+            self._add_select("preset", words.PRESET, {name: name for name in PRESETS})
             with ui.element("div").classes("run-numbers"):
-                self.steps = self._add_input("steps", texts.STEPS)
-                self.seed = self._add_input("seed", texts.SEED)
-            self.ask = self._add_select("ask", texts.ASK_LABEL, {"": "", **texts.ASK})
-            self.question = self._add_select("question", texts.QUESTION_LABEL, {"": "", **texts.QUESTION})
-            self._add_input("name", texts.FOLDER)
-            with ui.expansion(texts.MORE_SETTINGS, value=bool(tab.form.more)).props("dense").classes("more-settings"):
-                more = ui.textarea(texts.MORE_LABEL, value=tab.form.more, on_change=self._filling_in("more"))
+                self.steps = self._add_input("steps", words.STEPS)
+                self.seed = self._add_input("seed", words.SEED)
+            self.ask = self._add_select("ask", words.ASK_LABEL, {"": "", **words.ASK})
+            self.question = self._add_select("question", words.QUESTION_LABEL, {"": "", **words.QUESTION})
+            self._add_input("name", words.FOLDER)
+            with ui.expansion(words.MORE_SETTINGS, value=bool(tab.form.more)).props("dense").classes("more-settings"):
+                more = ui.textarea(words.MORE_LABEL, value=tab.form.more, on_change=self._filling_in("more"))
                 more.props("dense outlined autogrow spellcheck=false")
-                ui.label(texts.MORE_HINT).classes("explanation")
+                ui.label(words.MORE_HINT).classes("explanation")
             with ui.element("div").props('role="alert"'):
                 self.problems = ui.element("ul").classes("problems")
-            self.begin = ui.button(texts.BEGIN, on_click=tab.begin).props("no-caps color=primary").classes("begin")
+            self.begin = ui.button(words.BEGIN, on_click=tab.begin).props("no-caps color=primary").classes("begin")
 
     def show(self) -> None:
         """Show what the environment and the preset have where nothing is filled in, and what is wrong."""
@@ -57,12 +57,12 @@ class RunForm:
 
     def _show_usual(self) -> None:
         form, usual = self.tab.form, self.tab.form.usual()
-        self.objectives.set_text(texts.objectives(self.tab.environments[form.env]))
+        self.objectives.set_text(home_texts.objectives(self.tab.environments[form.env]))
         if usual:
-            self.steps.props["placeholder"] = texts.USUAL.format(value=short_count(usual.steps))
-            self.seed.props["placeholder"] = texts.USUAL.format(value=usual.seed)
-            self.ask.set_options(_with_usual(texts.ASK, usual.ask), value=form.ask)
-            self.question.set_options(_with_usual(texts.QUESTION, usual.question), value=form.question)
+            self.steps.props["placeholder"] = words.USUAL.format(value=short_count(usual.steps))
+            self.seed.props["placeholder"] = words.USUAL.format(value=usual.seed)
+            self.ask.set_options(_with_usual(words.ASK, usual.ask), value=form.ask)
+            self.question.set_options(_with_usual(words.QUESTION, usual.question), value=form.question)
 
     def _add_select(self, field: str, label: str, options: Mapping[str, str]) -> ui.select:
         value, filling_in = getattr(self.tab.form, field), self._filling_in(field)
@@ -78,4 +78,4 @@ class RunForm:
 
 def _with_usual(options: Mapping[str, str], usual: str) -> dict[str, str]:
     """Return the options, and before them none, which is what is usual."""
-    return {"": texts.USUAL.format(value=options[usual]), **options}
+    return {"": words.USUAL.format(value=options[usual]), **options}

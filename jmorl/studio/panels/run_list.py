@@ -4,7 +4,7 @@ from typing import Any
 
 from nicegui.element import Element
 
-from jmorl.studio import texts
+from jmorl.studio import home_texts, words
 from jmorl.studio.home import ListedRun
 from jmorl.studio.home_tab import HomeTab
 from jmorl.studio.panels.panel import Shown
@@ -21,10 +21,10 @@ class RunList:
         self.tab = tab
         self.shown = Shown()
         self.rows = Rows()
-        self.rows.props["columns"] = texts.RUNS_COLUMNS
+        self.rows.props["columns"] = words.RUNS_COLUMNS
         self.rows.props["rows"] = []
-        self.rows.props["texts"] = {"filter": texts.FILTER, "none": texts.NO_MATCH}
-        self.rows.props["empty"] = texts.READING
+        self.rows.props["texts"] = {"filter": words.FILTER, "none": words.NO_MATCH}
+        self.rows.props["empty"] = words.READING
         self.rows.props["opens"] = not tab.access.watching
         self.rows.on("open", lambda event: tab.open(str(event.args)))
 
@@ -33,7 +33,7 @@ class RunList:
         runs, open_folder = self.tab.runs, self.tab.session.open_folder
         if runs is not None and self.shown.is_new(runs, str(open_folder)):
             self.rows.props["rows"] = [_row(run, run.path == open_folder) for run in runs]
-            self.rows.props["empty"] = texts.NO_RUNS
+            self.rows.props["empty"] = words.NO_RUNS
             self.rows.update()
 
 
@@ -41,9 +41,12 @@ def _row(run: ListedRun, is_open: bool) -> dict[str, Any]:
     """Return what a row shows: for each column but the last a text, and a smaller one below it."""
     facts = run.facts
     cells = [
-        (run.name, texts.branch_of(facts.origin) if facts else ""),
-        (facts.env, texts.decider(facts)) if facts else ("", ""),
-        (texts.progress(facts), texts.budget(facts)) if facts else ("", ""),
-        (texts.OPEN_HERE if is_open else texts.STATES[run.state], run.why or (texts.result(facts) if facts else "")),
+        (run.name, home_texts.branch_of(facts.origin) if facts else ""),
+        (facts.env, home_texts.decider(facts)) if facts else ("", ""),
+        (home_texts.progress(facts), home_texts.budget(facts)) if facts else ("", ""),
+        (
+            words.OPEN_HERE if is_open else words.STATES[run.state],
+            run.why or (home_texts.result(facts) if facts else ""),
+        ),
     ]
     return {"name": run.name, "state": "open" if is_open else run.state, "cells": cells, "written": run.written}
