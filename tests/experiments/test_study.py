@@ -83,6 +83,9 @@ def test_what_is_counted_by_hand():
     assert ours.best == -57 and ours.utility.tolist() == [-57, -59]
     np.testing.assert_allclose(ours.shortfall, [0, 100 * 2 / 57])
     assert ours.good == 1
+    blundered, _ = user_rows(STUDY, part, {**records, key("interactive", "A", 2): replace(second, chosen=1)})
+    np.testing.assert_allclose(blundered.shortfall, [0, 100 * 13 / 57])
+    np.testing.assert_allclose(blundered.shortfall_of_front, [0, 100 * 2 / 57])
     # 5 % of 57 is 2.85: reached by the first run in its third generation, by the second in its second.
     assert ours.close.reached == (30 * ITERATION, 20 * ITERATION)
     assert ours.very_close.reached == (30 * ITERATION, None)

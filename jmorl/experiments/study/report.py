@@ -58,7 +58,9 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
         best = "on the exact front" if part.best else "that any run found"
         yield (
             "Questions, the last one included: median, least and most. Policies shown: in all questions, on average. "
-            f"Shortfall: how far the result's utility is below the best {best}, in percent: mean and worst. "
+            f"Shortfall: how far the result's utility is below the best {best}, in percent: mean and worst. Of the "
+            "front: the same for the best policy of the run's last front; what the result lacks beyond that, the "
+            "questions are to blame for. "
             f"Good: runs within {GOOD:g} %. Steps until the archive has a policy within {CLOSE:g} and {VERY_CLOSE:g} % "
             "of the best: mean, a run that never has one counting as the budget, and how many have one."
         )
@@ -75,7 +77,7 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
 
 
 def _user_table(rows: Sequence[UserRow]) -> str:
-    head = ["user", "method", "runs", "questions", "policies shown", "utility", "shortfall %", "good"]
+    head = ["user", "method", "runs", "questions", "policies shown", "utility", "shortfall %", "of the front %", "good"]
     head += [f"million steps to {each:g} %" for each in (CLOSE, VERY_CLOSE)]
     lines = [
         [
@@ -84,6 +86,7 @@ def _user_table(rows: Sequence[UserRow]) -> str:
             f"{row.shown.mean():.0f}",
             f"{row.utility.mean():.4g}",
             f"{row.shortfall.mean():.2f}, {row.shortfall.max():.2f}",
+            f"{row.shortfall_of_front.mean():.2f}, {row.shortfall_of_front.max():.2f}",
             share(row.good, len(row.seeds)),
             *(_times(times) for times in (row.close, row.very_close)),
         ]

@@ -33,6 +33,7 @@ class UserRow:
     asked: np.ndarray  # [S] questions
     shown: np.ndarray  # [S] policies, over all questions
     utility: np.ndarray  # [S] of the result
+    found: np.ndarray  # [S] the greatest utility in the run's last front
     best: float  # utility
     close: Times  # until the archive has a policy within 5 % of the best
     very_close: Times  # 1 %
@@ -40,12 +41,20 @@ class UserRow:
     @property
     def shortfall(self) -> np.ndarray:
         """How far below the best utility the results are, in percent of its size [S]."""
-        return 100 * (self.best - self.utility) / abs(self.best)
+        return self._below_best(self.utility)
+
+    @property
+    def shortfall_of_front(self) -> np.ndarray:
+        """How far below the best utility the best policies of the last fronts are, in percent of its size [S]."""
+        return self._below_best(self.found)
 
     @property
     def good(self) -> int:
         """How many runs end within 2 % of the best."""
         return int((self.shortfall <= GOOD).sum())
+
+    def _below_best(self, utility: np.ndarray) -> np.ndarray:
+        return 100 * (self.best - utility) / abs(self.best)
 
 
 def user_rows(study: Study, part: StudyPart, records: Records) -> list[UserRow]:
@@ -151,6 +160,7 @@ def _user_row(
         np.array([len(record.asked) if asks else 1 for record in records]),
         np.array([_shown(record) if asks else len(record.generations[-1].front) for record in records]),
         np.array(utility),
+        np.array([course[-1] for course in courses]),
         best,
         *(_until(records, courses, best - share / 100 * abs(best), part.steps) for share in (CLOSE, VERY_CLOSE)),
     )
