@@ -135,6 +135,7 @@ def test_a_person_steers_a_run_from_the_start_to_a_policy_file(browser, tmp_path
             ("picture", "png", b"\x89PNG"),
             ("page", "html", b"<!doc"),
         ):
+            tab.page.locator(".q-menu").wait_for(state="hidden")  # one that still closes takes the click
             tab.page.get_by_role("button", name="Save more").click()
             with tab.page.expect_download() as download:
                 tab.page.get_by_text(re.compile(f"as a {what}")).click()
