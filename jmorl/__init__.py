@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from jmorl.methods.registry import register_method
     from jmorl.search.families import Blending, Link
     from jmorl.search.policy import Blend, Policy
+    from jmorl.search.prospect import Prospect
     from jmorl.state import RunState
     from jmorl.storage.policy_file import load_policy, save_policy
     from jmorl.storage.resume import blend, branch, resume
@@ -116,6 +117,7 @@ _HOMES = {
     "jmorl.methods.base": "Method MethodError PackedSearch Problem Tasks",
     "jmorl.search.families": "Blending Link",
     "jmorl.search.policy": "Blend Policy",
+    "jmorl.search.prospect": "Prospect",
     "jmorl.state": "RunState",
     "jmorl.storage.policy_file": "load_policy save_policy",
     "jmorl.storage.resume": "blend branch resume",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import jmorl
 from tests.imports import import_circle, import_graph, imported_names, modules
 
 ROOT = Path(__file__).parent.parent
@@ -150,3 +151,9 @@ def test_only_the_programs_compile_training():
     """One place decides what is traced: elsewhere in `learning` there is no `jit`."""
     for path in files("jmorl.learning"):
         assert ("jax.jit(" in path.read_text()) == (path.name == "programs.py"), path
+
+
+def test_every_public_name_can_be_imported():
+    """Names are imported when they are first used: one without a home would be missed by nobody but a user."""
+    for name in jmorl.__all__:
+        assert getattr(jmorl, name) is not None

@@ -24,7 +24,7 @@ FORMS: dict[Shows, Form] = {"front": "best", "few": "best", "pair": "pair", "ran
 TRUSTED_REGRET = {"steer": 0.07, "final": 0.02}
 DOUBTED_REGRET = 0.05  # expected of an answer after it was given, from which on it may be a mistake
 FEWEST_AGAINST = 2  # other answers that it may be against
-EARLIER_ANSWERS = "by your earlier answers it is the best, or about {regret:.0%} of the front's range short of it"
+EARLIER_ANSWERS = "by your earlier answers it is the best, give or take {cost:.0f} % of the front's range"
 SKIPPED = "you skipped the question, and it is the best by your earlier answers"
 FEW = 5  # policies in a short question
 
@@ -77,18 +77,14 @@ class StandIn(Wrapper):
         if question.again:
             return self._heard(question, question)
         if len(question.front) == 1 and self.ask == "unsure" and self._reachable(question):
-            self.chose_last = True
-            return question, Answer(question.front[0].id, stand_in=True, reason="there is no other policy")
+            return self._chosen_for_them(question, 0, "there is no other policy")
         if self.ask == "always" and self.shows == "front":
             return self._heard(question, question)
         model = self._model(question)
         verdict = model.verdict()
         asked = self._shortened(question, model, verdict)
         if self._is_sure(question, verdict) and not self.ask_now and not self.user.remembers(asked):
-            self.chose_last = True
-            return question, Answer(
-                question.front[verdict.best].id, stand_in=True, reason=EARLIER_ANSWERS.format(regret=verdict.regret)
-            )
+            return self._chosen_for_them(question, verdict.best, EARLIER_ANSWERS.format(cost=100 * verdict.regret))
         self.ask_now = False
         return self._heard(question, asked)
 
@@ -103,13 +99,18 @@ class StandIn(Wrapper):
             question = replace(question, limits=self.limits)
             model = self._model(question)
             if isinstance(instead, Skip):
-                self.chose_last = True
-                best = question.front[model.verdict().best].id
-                return question, Answer(best, stand_in=True, reason=SKIPPED, limits=instead.limits)
+                return self._chosen_for_them(question, model.verdict().best, SKIPPED, instead.limits)
             if asked.form == "pair" or len(question.front) == 1:
                 raise AnswerError("there is no other pair to ask about") from instead
             asked, answer = self._heard(question, _about(question, model.sampled_pair(), "pair"))
             return asked, replace(answer, limits=answer.limits or instead.limits)
+
+    def _chosen_for_them(
+        self, question: Question, row: int, reason: str, limits: tuple[float, ...] | None = None
+    ) -> tuple[Question, Answer]:
+        """Return the question as it is, and an answer that is not the user's: the policy in this row of the front."""
+        self.chose_last = True
+        return question, Answer(question.front[row].id, stand_in=True, reason=reason, limits=limits)
 
     def _asked(self, asked: Question) -> tuple[Question, Answer]:
         """Ask the user, and take note of what they say. Return the question as they saw it, and the answer."""

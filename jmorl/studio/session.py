@@ -21,10 +21,11 @@ from jmorl.decision.answers import Answer, AnswerError, Instead, PointAnswer
 from jmorl.decision.protocol import Question
 from jmorl.events import RunFinished
 from jmorl.learning.population import TrainingFault
-from jmorl.methods.base import MethodError, Prospect
+from jmorl.methods.base import MethodError
 from jmorl.report.plots import draw_run
 from jmorl.report.timeline import Timeline
 from jmorl.search.policy import Policy, rescored
+from jmorl.search.prospect import Prospect
 from jmorl.storage.afterwards import keep_dialogue
 from jmorl.storage.layout import Layout
 from jmorl.storage.notes_file import change_note, read_notes

@@ -59,8 +59,8 @@ def _section(study: Study, part: StudyPart, out: Path, records: Records) -> Iter
         yield (
             "Questions, the last one included: median, least and most. Policies shown: in all questions, on average. "
             f"Shortfall: how far the result's utility is below the best {best}, in percent: mean and worst. Of the "
-            "front: the same for the best policy of the run's last front; what the result lacks beyond that, the "
-            "questions are to blame for. "
+            "front: the same for the best policy of the run's last front. What the result lacks beyond that was lost "
+            "by the choice. "
             f"Good: runs within {GOOD:g} %. Steps until the archive has a policy within {CLOSE:g} and {VERY_CLOSE:g} % "
             "of the best: mean, a run that never has one counting as the budget, and how many have one."
         )
