@@ -10,7 +10,7 @@ import numpy as np
 from envs.core import Objective
 from jmorl.decision.answers import Adjust, Answer, AskPair, Back, Choose, Instead, PointAnswer, Skip
 from jmorl.decision.protocol import DecisionMaker, PointQuestion, Question
-from jmorl.decision.terminal_view import show_front, show_outlook, show_points
+from jmorl.decision.terminal_view import show_front, show_introduction, show_outlook, show_points
 from jmorl.display.console import PlainConsole
 from jmorl.display.readings import direction
 
@@ -62,9 +62,13 @@ class TerminalUser(DecisionMaker):
     def __init__(self, console: PlainConsole | None = None, read: Callable[[str], str] | None = None):
         self.console = console or PlainConsole()
         self.read = read or input
+        self._introduced = False
 
     def answer(self, question: Question) -> Answer:
         """Return the preferred member of the question's front."""
+        if question.generation == 1 and not self._introduced:
+            self._introduced = True
+            show_introduction(self.console, question)
         show_front(self.console, question, by=0)
         limits = question.limits
         while True:

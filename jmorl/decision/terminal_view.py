@@ -18,13 +18,7 @@ PLOT_WIDTH, PLOT_HEIGHT = 84, 19  # characters at most
 
 
 def show_front(console: PlainConsole, question: Question, by: int) -> None:
-    """Show the question, its front with the best in objective `by` first, and a plot of it.
-
-    Before the first question of a run it says what happens.
-    """
-    if question.generation == 1 and question.purpose == "steer" and not question.again:
-        console.print()
-        console.print(introduction(question.objectives))
+    """Show the question, its front with the best in objective `by` first, and a plot of it."""
     heading = front_question(question.purpose, question.generation, len(question.front), question.form, question.again)
     table = front_table(
         question.front,
@@ -50,6 +44,12 @@ def show_front(console: PlainConsole, question: Question, by: int) -> None:
     by_whom = "chosen for you" if question.previous_by_stand_in else "your last choice"
     marks, legend = ({"x": chosen[0]}, f"o: a policy, x: {by_whom}") if chosen else ({}, "o: a policy")
     show_plot(console, question.objectives, question.values, marks, legend)
+
+
+def show_introduction(console: PlainConsole, question: Question) -> None:
+    """Say to somebody new what happens."""
+    console.print()
+    console.print(introduction(question.objectives))
 
 
 def show_outlook(console: PlainConsole, question: Question, policy_id: int) -> None:

@@ -201,9 +201,10 @@ def test_what_a_choice_would_mean(ask):
 def test_before_the_first_question_one_is_told_what_happens(ask):
     told = "Policies are trained that trade time label and fuel label against each other."
     for generation, said in ((1, True), (2, False)):
-        session = Session("12")
+        session = Session("all", "12", "12")
         session.user.answer(ask(VALUES, generation=generation))
-        assert (told in " ".join(session.output.split())) == said
+        session.user.answer(ask(VALUES, generation=generation))  # about a pair, say
+        assert session.sentences.count(told) == said
 
 
 def test_numbers_may_be_written_as_people_write_them(ask):
